@@ -1,0 +1,75 @@
+# Every command makes the virtual environment it needs in .venv, once, and again when
+# pyproject.toml changes. Nothing but make and Python 3.11 or newer has to be there before.
+
+PYTHON ?=
+ARGS ?=
+
+VENV := .venv
+BIN := $(VENV)/bin
+INSTALLED := $(VENV)/.installed
+
+# Run after each installation, e.g. to compile the kernels ahead of the first use. Empty: nothing.
+WARM ?=
+BENCH := $(BIN)/python -m benchmarks
+
+# Another project's paths (ROS sets some) must not leak into the virtual environment.
+unexport PYTHONPATH PYTHONHOME
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.NOTPARALLEL:
+.PHONY: help demo test lint bench warm clean
+
+help: ## this list
+	@echo "make TARGET [PYTHON=an interpreter for .venv] [ARGS=options passed on]"
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  %-6s %s\n", $$1, $$2 }' Makefile
+
+demo: $(INSTALLED)-demo ## a robot carries a load under vision-based control, and the plots of it
+	@$(BIN)/cdpr-drake run $(ARGS)
+
+test: $(INSTALLED)-test ## the tests, in two processes
+	@echo "Testing"
+	@$(BIN)/pytest -n 2 $(ARGS)
+
+lint: $(INSTALLED)-dev ## linter, formatter (nothing is rewritten) and type checker
+	@echo "Checking the code"
+	@status=0; \
+	$(BIN)/ruff check || status=1; \
+	$(BIN)/ruff format --check || status=1; \
+	$(BIN)/mypy || status=1; \
+	exit $$status
+
+bench: $(INSTALLED)-demo ## the benchmarks
+	@$(BENCH) $(ARGS)
+
+warm:
+	@$(WARM)
+
+clean: ## remove the virtual environments, what was built, and caches
+	rm -rf .venv .venv-3.12 build dist *.egg-info
+	rm -rf .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# $(call install,EXTRAS): make the virtual environment unless it works, and install this checkout.
+define install
+@$(BIN)/python -m pip --version >/dev/null 2>&1 || { \
+	python=$$(sh .ci/find-python 3.11 or-newer "$(PYTHON)") && \
+	echo "Creating $(VENV) with $$python" && \
+	rm -rf $(VENV) && "$$python" -m venv $(VENV); }
+@echo "Installing cdpr_drake[$(1)] into $(VENV) (a minute or two the first time)"
+@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[$(1)]"
+@$(MAKE) --no-print-directory warm
+endef
+
+# Each set of extras contains the one before, so a larger one vouches for the smaller.
+$(INSTALLED)-demo: pyproject.toml
+	$(call install,fast)
+	@touch $@
+
+$(INSTALLED)-test: pyproject.toml
+	$(call install,fast,test,notebook)
+	@touch $(INSTALLED)-demo $@
+
+$(INSTALLED)-dev: pyproject.toml
+	$(call install,fast,test,notebook,dev)
+	@touch $(INSTALLED)-demo $(INSTALLED)-test $@

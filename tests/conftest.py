@@ -1,0 +1,105 @@
+"""What tests share: probes of the machine, and `@pytest.mark.needs(name)` to skip by them."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from functools import cache
+from importlib.metadata import version
+
+import hypothesis
+import pytest
+
+os.environ.setdefault("MPLBACKEND", "Agg")  # figures open no window
+
+# No deadline: a test must not fail because the machine is busy or numba compiles.
+hypothesis.settings.register_profile("cdpr_drake", hypothesis.settings.default, deadline=None)
+hypothesis.settings.load_profile("cdpr_drake")
+
+# RenderEngineVtk ends the process with a segmentation fault where EGL finds no driver.
+RENDER_ONE_IMAGE = """
+from pydrake.geometry import (
+    ClippingRange, ColorRenderCamera, MakeRenderEngineVtk, RenderCameraCore, RenderEngineVtkParams
+)
+from pydrake.math import RigidTransform
+from pydrake.systems.sensors import CameraInfo, ImageRgba8U
+camera = CameraInfo(width=8, height=8, fov_y=1.0)
+core = RenderCameraCore("probe", camera, ClippingRange(0.1, 10.0), RigidTransform())
+engine = MakeRenderEngineVtk(RenderEngineVtkParams())
+engine.RenderColorImage(ColorRenderCamera(core), ImageRgba8U(8, 8))
+"""
+
+
+def _runs(*command: str) -> bool:
+    try:
+        return subprocess.run(command, capture_output=True, timeout=60).returncode == 0
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+
+
+@cache
+def has_numba() -> bool:
+    """Whether numba is installed."""
+    return importlib.util.find_spec("numba") is not None
+
+
+@cache
+def find_chromium() -> str | None:
+    """Return the path of a Chromium or Chrome that starts, or None."""
+    for name in ("chromium", "chromium-browser", "google-chrome"):
+        path = shutil.which(name)
+        if path and _runs(path, "--version"):
+            return path
+    return None
+
+
+def has_chromium() -> bool:
+    """Whether there is a Chromium or Chrome that starts."""
+    return find_chromium() is not None
+
+
+@cache
+def has_egl() -> bool:
+    """Whether Drake can render an image without a display, tried in another process."""
+    return _runs(sys.executable, "-c", RENDER_ONE_IMAGE)
+
+
+@cache
+def has_graphviz() -> bool:
+    """Whether graphviz' `dot` runs."""
+    return _runs("dot", "-V")
+
+
+@cache
+def has_jupyter() -> bool:
+    """Whether notebooks can be run."""
+    return all(importlib.util.find_spec(name) for name in ("nbformat", "nbclient", "ipykernel"))
+
+
+# For `@pytest.mark.needs(name)`: the probe, run only when a test asks, and the reason to skip.
+NEEDS: dict[str, tuple[Callable[[], bool], str]] = {
+    "numba": (has_numba, "numba is not installed (the `fast` extra)"),
+    "chromium": (has_chromium, "no Chromium or Chrome that starts"),
+    "egl": (has_egl, "no EGL driver, so Drake cannot render without a display"),
+    "graphviz": (has_graphviz, "graphviz' `dot` is not installed"),
+    "jupyter": (has_jupyter, "nbclient or ipykernel is not installed (the `notebook` extra)"),
+}
+
+
+def pytest_report_header() -> str:
+    """Name the versions the results depend on."""
+    numba = f"numba {version('numba')}" if has_numba() else "no numba"
+    return f"drake {version('drake')}, numpy {version('numpy')}, {numba}"
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Skip a test when something it needs is not here."""
+    for mark in item.iter_markers("needs"):
+        for name in mark.args:
+            is_here, reason = NEEDS[name]
+            if not is_here():
+                pytest.skip(reason)
