@@ -43,33 +43,37 @@ bench: $(INSTALLED)-demo ## the benchmarks
 	@$(BENCH) $(ARGS)
 
 warm:
-	@$(WARM)
+	@$(or $(WARM),:)
 
 clean: ## remove the virtual environments, what was built, and caches
 	rm -rf .venv .venv-3.12 build dist *.egg-info
 	rm -rf .hypothesis .mypy_cache .pytest_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-# $(call install,EXTRAS): make the virtual environment unless it works, and install this checkout.
+# Each set of extras contains the one before, so a larger one vouches for the smaller.
+$(INSTALLED)-demo: EXTRAS := fast
+$(INSTALLED)-test: EXTRAS := fast,test,notebook
+$(INSTALLED)-dev: EXTRAS := fast,test,notebook,dev
+
+$(INSTALLED)-demo: pyproject.toml
+	$(install)
+	@touch $@
+
+$(INSTALLED)-test: pyproject.toml
+	$(install)
+	@touch $(INSTALLED)-demo $@
+
+$(INSTALLED)-dev: pyproject.toml
+	$(install)
+	@touch $(INSTALLED)-demo $(INSTALLED)-test $@
+
+# Make the virtual environment unless it works, and install this checkout with EXTRAS.
 define install
 @$(BIN)/python -m pip --version >/dev/null 2>&1 || { \
 	python=$$(sh .ci/find-python 3.11 or-newer "$(PYTHON)") && \
 	echo "Creating $(VENV) with $$python" && \
 	rm -rf $(VENV) && "$$python" -m venv $(VENV); }
-@echo "Installing cdpr_drake[$(1)] into $(VENV) (a minute or two the first time)"
-@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[$(1)]"
+@echo "Installing cdpr_drake[$(EXTRAS)] into $(VENV) (a minute or two the first time)"
+@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[$(EXTRAS)]"
 @$(MAKE) --no-print-directory warm
 endef
-
-# Each set of extras contains the one before, so a larger one vouches for the smaller.
-$(INSTALLED)-demo: pyproject.toml
-	$(call install,fast)
-	@touch $@
-
-$(INSTALLED)-test: pyproject.toml
-	$(call install,fast,test,notebook)
-	@touch $(INSTALLED)-demo $@
-
-$(INSTALLED)-dev: pyproject.toml
-	$(call install,fast,test,notebook,dev)
-	@touch $(INSTALLED)-demo $(INSTALLED)-test $@
