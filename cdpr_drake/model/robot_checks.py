@@ -1,0 +1,187 @@
+"""What makes a robot valid, all in one place. Runs whenever a `CableRobot` is made."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import combinations
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from cdpr_drake.model.robot import CableRobot
+
+_STEEL = 7850.0  # kg/m3
+
+Problems = Iterator[tuple[str, str]]
+
+PER_CABLE = ("cable.drum_run", "winch.encoder_zero_length", "load_cells.bias", "load_cells.gain")
+
+_POSITIVE = (
+    "gravity",
+    "platform.mass",
+    "cable.linear_density",
+    "cable.diameter",
+    "cable.section",
+    "cable.stiffness.asymptote",
+    "cable.stiffness.offset",
+    "cable.max_tension",
+    "cable.breaking_load",
+    "winch.transmission",
+    "winch.inertia",
+    "winch.torque_limit",
+    "winch.coulomb_rate",
+    "winch.capstan_speed",
+    "cameras.sample_time",
+    "load_cells.gain",
+    "load_cells.cutoff",
+    "load_cells.order",
+)
+_NOT_NEGATIVE = (
+    "payload.mass",
+    "cable.damping_time",
+    "cable.drum_run",
+    "cable.min_tension",
+    "winch.damping",
+    "winch.proportional_gain",
+    "winch.integral_gain",
+    "winch.derivative_gain",
+    "winch.encoder_zero_length",
+    "winch.coulomb_torque",
+    "winch.capstan_exponent",
+    "cameras.position_noise",
+    "cameras.orientation_noise",
+    "cameras.tangent_noise",
+    "cameras.latency",
+    "load_cells.noise",
+)
+_FINITE = (
+    "drawing_points",
+    "attachment_points",
+    "platform.center_of_mass",
+    "platform.inertia",
+    "payload.center_of_mass",
+    "payload.inertia",
+    "cable.stiffness.softening",
+    "load_cells.bias",
+)
+
+
+def geometry_problems(robot: CableRobot) -> Problems:
+    """Yields (field, what is wrong) for the points that say how many cables there are.
+
+    Args:
+        robot: the robot, as given.
+    """
+    shape = robot.drawing_points.shape
+    if len(shape) != 2 or shape[0] < 1 or shape[1] != 3:
+        yield "drawing_points", f"must have shape (k, 3) with k >= 1, got {shape}"
+    if robot.attachment_points.shape != shape:
+        got = robot.attachment_points.shape
+        yield "attachment_points", f"must have the shape of drawing_points, {shape}, got {got}"
+
+
+def value_problems(robot: CableRobot) -> Problems:
+    """Yields (field, what is wrong) for everything else.
+
+    Args:
+        robot: the robot, its per-cable values given for each cable.
+    """
+    yield from _shapes(robot)
+    for path in _FINITE:
+        yield from _require(robot, path, np.isfinite, "finite")
+    for path in _POSITIVE:
+        yield from _require(robot, path, lambda v: np.isfinite(v) & (v > 0), "positive and finite")
+    for path in _NOT_NEGATIVE:
+        yield from _require(robot, path, lambda v: np.isfinite(v) & (v >= 0), ">= 0 and finite")
+    for name in ("X_WF", "X_PM"):
+        pose: Any = getattr(robot.cameras, name).GetAsMatrix34()
+        if not np.all(np.isfinite(pose)):
+            yield f"cameras.{name}", "must be finite"
+    yield from _twins(robot)
+    yield from _inertias(robot)
+    yield from _cable(robot)
+    for path in robot.sources:
+        try:
+            attrgetter(path)(robot)
+        except AttributeError:
+            yield "sources", f"{path!r} is not a field of a robot"
+
+
+def oddities(robot: CableRobot) -> Problems:
+    """Yields (field, what is unusual) for values that are valid but may be a slip.
+
+    Args:
+        robot: a valid robot.
+    """
+    density = robot.cable.linear_density / robot.cable.section
+    if abs(density / _STEEL - 1.0) > 0.1:
+        steel = f"steel has {_STEEL:.0f} kg/m3"
+        yield "cable.linear_density", f"over section it is {density:.0f} kg/m3; {steel}"
+
+
+def _shapes(robot: CableRobot) -> Problems:
+    wanted: dict[str, tuple[int, ...]] = dict.fromkeys(PER_CABLE, (robot.num_cables,))
+    for body in ("platform", "payload"):
+        wanted |= {f"{body}.center_of_mass": (3,), f"{body}.inertia": (3, 3)}
+    for path, shape in wanted.items():
+        got = attrgetter(path)(robot).shape
+        if got != shape:
+            yield path, f"must have shape {shape}, got {got}"
+
+
+def _require(robot, path: str, test, wanted: str) -> Problems:  # type: ignore[no-untyped-def]
+    value = np.asarray(attrgetter(path)(robot))
+    good = test(value)
+    if value.ndim == 0 and not good:
+        yield path, f"must be {wanted}, got {value.item()!r}"
+    elif not np.all(good):
+        row = int(np.argwhere(~good)[0][0])
+        what = f"cable {row + 1}" if value.shape[0] == robot.num_cables else f"entry {row + 1}"
+        yield path, f"must be {wanted}, got {value[row].tolist()!r} for {what}"
+
+
+def _twins(robot: CableRobot) -> Problems:
+    ends = np.hstack([robot.drawing_points, robot.attachment_points])
+    for i, j in combinations(range(robot.num_cables), 2):
+        if np.array_equal(ends[i], ends[j]):
+            yield "drawing_points", f"cables {i + 1} and {j + 1} are the same at both ends"
+
+
+def _inertias(robot: CableRobot) -> Problems:
+    for name in ("platform", "payload"):
+        body = getattr(robot, name)
+        inertia, path = body.inertia, f"{name}.inertia"
+        if body.mass == 0.0:
+            if np.any(inertia):
+                yield path, "must be zero, for the mass is zero"
+            continue
+        size = np.abs(inertia).max()
+        if not np.allclose(inertia, inertia.T, rtol=0.0, atol=1e-9 * size):
+            yield path, f"must be symmetric, got {inertia.tolist()}"
+            continue
+        low, mid, high = np.linalg.eigvalsh(inertia)
+        moments = f"principal moments are {low:.6g}, {mid:.6g}, {high:.6g} kg m2"
+        if name == "platform" and low <= 0.0:
+            yield path, f"must be positive definite, but its {moments}"
+        elif low < -1e-9 * size:
+            yield path, f"must not be negative, but its {moments}"
+        elif high > (low + mid) * (1.0 + 1e-9):
+            yield path, f"no body has it: its {moments}, the last above the sum of the others"
+
+
+def _cable(robot: CableRobot) -> Problems:
+    cable = robot.cable
+    if cable.stiffness(0.0) <= 0.0:
+        yield "cable.stiffness", f"must be positive at no tension, got {cable.stiffness(0.0):g} N"
+    circle = 0.25 * math.pi * cable.diameter**2
+    if cable.section > circle:
+        yield "cable.section", f"{cable.section:g} m2 exceeds the circle's, {circle:g} m2"
+    if cable.min_tension >= cable.max_tension:
+        limits = f"{cable.max_tension:g} N, got {cable.min_tension:g} N"
+        yield "cable.min_tension", f"must be below max_tension, {limits}"
+    if cable.max_tension > cable.breaking_load:
+        limits = f"{cable.breaking_load:g} N, got {cable.max_tension:g} N"
+        yield "cable.max_tension", f"must not exceed breaking_load, {limits}"
