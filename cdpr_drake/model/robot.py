@@ -332,6 +332,8 @@ def load_robot(name_or_path: str | os.PathLike[str]) -> CableRobot:
     files = _built_in()
     known = f"built-in robots: {', '.join(sorted(files))}"
     file = os.fspath(name_or_path)
+    if not file:
+        raise RobotFileError("no file", "", f"the name is empty; {known}")
     try:
         if name_or_path in files:
             text = files[file].read_text(encoding="utf-8")

@@ -97,9 +97,9 @@ def value_problems(robot: CableRobot) -> Problems:
     for path in _NOT_NEGATIVE:
         yield from _require(robot, path, lambda v: np.isfinite(v) & (v >= 0), ">= 0 and finite")
     for name in ("X_WF", "X_PM"):
-        pose: Any = getattr(robot.cameras, name).GetAsMatrix34()
-        if not np.all(np.isfinite(pose)):
-            yield f"cameras.{name}", "must be finite"
+        X: Any = getattr(robot.cameras, name)
+        if not (np.all(np.isfinite(X.GetAsMatrix34())) and X.rotation().IsValid()):
+            yield f"cameras.{name}", "must be a finite translation and a rotation"
     yield from _twins(robot)
     yield from _inertias(robot)
     yield from _cable(robot)

@@ -122,7 +122,7 @@ def _build(cls: type[R], schema: Any) -> R:
 
 def _parse(text: str) -> Any:
     try:
-        _refuse_duplicates(yaml.compose(text, Loader=yaml.SafeLoader), "")
+        _inspect_keys(yaml.compose(text, Loader=yaml.SafeLoader), "")
         return yaml_load_data(text)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
@@ -132,17 +132,20 @@ def _parse(text: str) -> Any:
         raise RobotFileError("", "", f"not valid YAML: {one_line(error)}") from None
 
 
-def _refuse_duplicates(node: yaml.Node | None, where: str) -> None:
-    """PyYAML keeps the last of two equal keys without a word."""
+def _inspect_keys(node: yaml.Node | None, where: str) -> None:
+    """PyYAML keeps the last of two equal keys without a word; Drake's reader takes only text."""
     if isinstance(node, yaml.MappingNode):
         lines: dict[str, int] = {}
         for key, value in node.value:
-            field, line = f"{where}{key.value}", key.start_mark.line + 1
+            name = key.value if isinstance(key, yaml.ScalarNode) else "(a key)"
+            field, line = f"{where}{name}", key.start_mark.line + 1
+            if key.tag not in ("tag:yaml.org,2002:str", "tag:yaml.org,2002:merge"):
+                raise RobotFileError("", field, f"must be text to be a field's name, line {line}")
             if field in lines:
-                lines_of_both = f"lines {lines[field]} and {line}"
-                raise RobotFileError("", field, f"is given twice, on {lines_of_both}")
+                both = f"lines {lines[field]} and {line}"
+                raise RobotFileError("", field, f"is given twice, on {both}")
             lines[field] = line
-            _refuse_duplicates(value, f"{field}.")
+            _inspect_keys(value, f"{field}.")
 
 
 def _inspect(value: Any, kind: Any) -> None:
@@ -209,13 +212,11 @@ def _inspect_array(value: Any, got: str) -> None:
 
 
 def _is_number(value: Any) -> bool:
-    if isinstance(value, str):
-        try:
-            float(value)
-        except ValueError:
-            return False
-        return True
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
+    try:
+        float(value)
+    except (TypeError, ValueError, OverflowError):
+        return False
+    return not isinstance(value, bool)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True, eq=False)
@@ -252,10 +253,16 @@ class _Pose(Record):
             if not np.all(np.isfinite(value)):
                 raise RobotFileError("", name, f"must be finite, got {value.tolist()}")
         translation: Any = self.translation
-        try:
-            return RigidTransform(_rotation(self.rotation), translation)
-        except RuntimeError:  # Drake's message runs over several lines
-            raise RobotFileError("", "rotation", "is not a rotation matrix") from None
+        rotation = _rotation(self.rotation)
+        if not rotation.IsValid():  # for instance written with ten digits
+            given: Any = self.rotation
+            if not (
+                np.allclose(given @ given.T, np.eye(3), rtol=0.0, atol=1e-6)
+                and np.linalg.det(given) > 0.0
+            ):
+                raise RobotFileError("", "rotation", "is not a rotation matrix")
+            rotation = RotationMatrix.ProjectToRotationMatrix(given)
+        return RigidTransform(rotation, translation)
 
 
 def _rotation(value: Any) -> RotationMatrix:
