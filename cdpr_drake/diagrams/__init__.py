@@ -1,0 +1,26 @@
+"""Robot and control loops as Drake diagrams, their rest contexts, and their simulation."""
+
+from cdpr_drake.diagrams.control import (
+    make_joint_space_control,
+    make_vision_based_control,
+    with_reference,
+)
+from cdpr_drake.diagrams.rest import leaf_systems, rest_context, robot_of, set_at_rest
+from cdpr_drake.diagrams.robot import make_cable_robot, make_platform, platform_pose
+from cdpr_drake.diagrams.simulation import Record, make_simulator, simulate
+
+__all__ = [
+    "Record",
+    "leaf_systems",
+    "make_cable_robot",
+    "make_joint_space_control",
+    "make_platform",
+    "make_simulator",
+    "make_vision_based_control",
+    "platform_pose",
+    "rest_context",
+    "robot_of",
+    "set_at_rest",
+    "simulate",
+    "with_reference",
+]

@@ -1,0 +1,296 @@
+"""The two control loops of the paper: vision-based (Fig. 8) and joint space control (Fig. 9)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from pydrake.common import RandomDistribution
+from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, LeafSystem, OutputPort
+from pydrake.systems.primitives import DiscreteTimeDelay, RandomSource, ZeroOrderHold
+
+from cdpr_drake.diagrams.robot import ROBOT_OUTPUTS, make_cable_robot
+from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.servo import ServoSettings
+from cdpr_drake.systems import (
+    CableTangentCameras,
+    CameraMeasurement,
+    InverseKinematicsAngles,
+    LoadCellFilter,
+    MotorAngleIntegrator,
+    PoseError,
+    PositionBasedVisualServo,
+)
+
+NOISE_PERIOD = 0.05
+"""How long a noise sample lasts in an all-continuous loop with noise [s]."""
+
+
+def make_vision_based_control(
+    robot: CableRobot,
+    cable_model: str = "SCMWE",
+    gain: float = 0.1,
+    sample_time: float | None = 0.05,
+    latency: float = 0.04,
+    *,
+    calibrated: CableRobot | None = None,
+    noise: bool = False,
+    settings: ServoSettings | None = None,
+    **servo: Any,
+) -> Diagram:
+    """Return the vision-based control loop of Fig. 8 around the robot.
+
+    .. pydrake_system::
+
+        name: vision_based_control
+        input_ports:
+        - desired_pose
+        - desired_twist (may stay open)
+        - external_wrench (may stay open)
+        - pose_noise, tangent_noise, tension_noise (without `noise`; may stay open)
+        output_ports:
+        - pose_error_seen
+        - pose_error
+        - measured_pose
+        - measured_tangents
+        - measured_tension
+        - commanded_motor_rates
+        - desired_motor_angles
+        - those of make_cable_robot
+
+    Blocks: "robot", "camera", "tangent_cameras", "load_cells", "servo", "integrator", "true_error";
+    in the sampled loop "sampled_pose", "sampled_tangents", "sampled_tension" and "held_rates" too.
+    Measurements are taken at k T; the motor rates change at k T + latency and are held.
+
+    Args:
+        robot: the true robot.
+        cable_model: the control law's "ECM", "CMWE", "SCMWE" or "SLSM".
+        gain: lambda [1/s].
+        sample_time: period T of the vision loop [s]; None for an all-continuous loop.
+        latency: from image to change of the motor rates [s]; without effect if all is continuous.
+        calibrated: the robot as the controller believes it; the true one if None.
+        noise: whether to add named sources of measurement noise; otherwise noise ports are
+            exported. Sources hold discrete and abstract state, which no linearisation takes.
+        settings: the law's other settings; its cable_model and gain give way to those above.
+        servo: fields of ServoSettings (order, ramp_time, max_speed, max_angular_speed,
+            model_drum_run), over those of `settings`.
+
+    Raises:
+        GeometryError: the cables cannot control all six degrees of freedom.
+        ValueError: a gain, period or latency out of range; gain * sample_time >= 1.
+    """
+    believed = calibrated if calibrated is not None else robot
+    k = robot.num_cables
+    if believed.num_cables != robot.num_cables:
+        raise ValueError(
+            f"{believed.num_cables} cables in the calibrated robot, {k} in the true one"
+        )
+    fields = {**(vars(settings) if settings else {}), **servo}
+    law = ServoSettings(**{**fields, "cable_model": cable_model, "gain": gain})
+    check_sampling(gain, sample_time, latency)
+
+    builder = DiagramBuilder()
+    plant = builder.AddNamedSystem("robot", make_cable_robot(robot))
+    camera = builder.AddNamedSystem("camera", CameraMeasurement(robot, believed))
+    tangents = builder.AddNamedSystem("tangent_cameras", CableTangentCameras(robot))
+    cells = builder.AddNamedSystem("load_cells", LoadCellFilter(robot, believed))
+    servo_law = builder.AddNamedSystem("servo", PositionBasedVisualServo(believed, law))
+    integrator = builder.AddNamedSystem("integrator", MotorAngleIntegrator(k))
+    error = builder.AddNamedSystem("true_error", PoseError(robot))
+
+    builder.Connect(plant.GetOutputPort("pose"), camera.GetInputPort("pose"))
+    builder.Connect(
+        plant.GetOutputPort("tangents_at_drawing_point"), tangents.GetInputPort("tangents")
+    )
+    builder.Connect(plant.GetOutputPort("tension_at_winch"), cells.GetInputPort("tension_at_winch"))
+    builder.Connect(plant.GetOutputPort("pose"), error.GetInputPort("pose"))
+    measured = {
+        "pose": camera.GetOutputPort("measured_pose"),
+        "tangents": tangents.GetOutputPort("measured_tangents"),
+        "tension": cells.GetOutputPort("measured_tension"),
+    }
+    rates = servo_law.GetOutputPort("motor_rates")
+    if sample_time is not None:
+        measured, rates = _sample(builder, measured, rates, sample_time, latency)
+    for name, port in measured.items():
+        builder.Connect(port, servo_law.GetInputPort(f"measured_{name}"))
+    builder.Connect(rates, integrator.GetInputPort("motor_rates"))
+    builder.Connect(
+        integrator.GetOutputPort("motor_angles"), plant.GetInputPort("desired_motor_angles")
+    )
+
+    _export_input(builder, "desired_pose", servo_law, error)
+    builder.ExportInput(servo_law.GetInputPort("desired_twist"), "desired_twist")
+    builder.ExportInput(plant.GetInputPort("external_wrench"), "external_wrench")
+    for name, system in (("pose", camera), ("tangent", tangents), ("tension", cells)):
+        _add_noise(builder, f"{name}_noise", system.GetInputPort("noise"), noise, sample_time)
+
+    builder.ExportOutput(servo_law.GetOutputPort("pose_error"), "pose_error_seen")
+    builder.ExportOutput(error.GetOutputPort("pose_error"), "pose_error")
+    for name, port in measured.items():
+        builder.ExportOutput(port, f"measured_{name}")
+    builder.ExportOutput(rates, "commanded_motor_rates")
+    builder.ExportOutput(integrator.GetOutputPort("motor_angles"), "desired_motor_angles")
+    return _finish(builder, plant, "vision_based_control")
+
+
+def make_joint_space_control(
+    robot: CableRobot, *, cable_model: str = "SCMWE", calibrated: CableRobot | None = None
+) -> Diagram:
+    """Return the joint space control loop of Fig. 9 around the robot.
+
+    .. pydrake_system::
+
+        name: joint_space_control
+        input_ports:
+        - desired_pose
+        - external_wrench (may stay open)
+        output_ports:
+        - pose_error
+        - desired_motor_angles
+        - those of make_cable_robot
+
+    Blocks: "robot", "inverse_kinematics", "true_error". Motor angle zero is an absolute,
+    unstretched reference, so that the stretch of the cables shows as an error of the pose.
+
+    Args:
+        robot: the true robot.
+        cable_model: of the inverse kinematics; the paper takes "SCMWE" (eq. 8).
+        calibrated: the robot as the controller believes it; the true one if None.
+
+    Raises:
+        ValueError: an unknown cable model.
+    """
+    believed = calibrated if calibrated is not None else robot
+    builder = DiagramBuilder()
+    plant = builder.AddNamedSystem("robot", make_cable_robot(robot))
+    inverse = builder.AddNamedSystem(
+        "inverse_kinematics", InverseKinematicsAngles(believed, cable_model)
+    )
+    error = builder.AddNamedSystem("true_error", PoseError(robot))
+    builder.Connect(
+        inverse.GetOutputPort("motor_angles"), plant.GetInputPort("desired_motor_angles")
+    )
+    builder.Connect(plant.GetOutputPort("pose"), error.GetInputPort("pose"))
+    _export_input(builder, "desired_pose", inverse, error)
+    builder.ExportInput(plant.GetInputPort("external_wrench"), "external_wrench")
+    builder.ExportOutput(error.GetOutputPort("pose_error"), "pose_error")
+    builder.ExportOutput(inverse.GetOutputPort("motor_angles"), "desired_motor_angles")
+    return _finish(builder, plant, "joint_space_control")
+
+
+def with_reference(loop: Diagram, reference: LeafSystem) -> Diagram:
+    """Return a diagram of a loop fed by a moving reference; its other ports are exported again.
+
+    Args:
+        loop: a control loop with an input "desired_pose" (and perhaps "desired_twist").
+        reference: a system with outputs of those names, e.g. `ExponentialApproach`.
+    """
+    builder = DiagramBuilder()
+    builder.AddNamedSystem("loop", loop)
+    builder.AddNamedSystem("reference", reference)
+    for index in range(loop.num_input_ports()):
+        port = loop.get_input_port(index)
+        if reference.HasOutputPort(port.get_name()):
+            builder.Connect(reference.GetOutputPort(port.get_name()), port)
+        else:
+            builder.ExportInput(port, port.get_name())
+    for index in range(loop.num_output_ports()):
+        port = loop.get_output_port(index)
+        builder.ExportOutput(port, port.get_name())
+    builder.ExportOutput(reference.GetOutputPort("desired_pose"), "desired_pose")
+    diagram = builder.Build()
+    diagram.set_name(loop.get_name())
+    return diagram
+
+
+def check_sampling(gain: float, sample_time: float | None, latency: float) -> None:
+    """Raise ValueError unless a sampled loop can work at all.
+
+    Args:
+        gain: lambda [1/s].
+        sample_time: period [s], or None.
+        latency: [s].
+    """
+    if sample_time is None:
+        return
+    if not (math.isfinite(sample_time) and sample_time > 0.0):
+        raise ValueError(f"the sample time must be positive, got {sample_time} s")
+    if not (math.isfinite(latency) and latency >= 0.0):
+        raise ValueError(f"the latency must not be negative, got {latency} s")
+    if gain * sample_time >= 1.0:
+        raise ValueError(
+            f"gain * sample time = {gain:g}/s * {sample_time:g} s = {gain * sample_time:.3g} must "
+            "be below 1: the loop would overshoot at every sample"
+        )
+
+
+def split_latency(sample_time: float, latency: float) -> tuple[int, float]:
+    """Return (n, phase) with latency = n T + phase and 0 <= phase < T, phases near T rounded.
+
+    Args:
+        sample_time: T [s].
+        latency: [s].
+    """
+    frames = math.floor(latency / sample_time + 1e-9)
+    phase = latency - frames * sample_time
+    return frames, (phase if phase > 1e-9 * sample_time else 0.0)
+
+
+def _sample(
+    builder: DiagramBuilder,
+    measured: dict[str, OutputPort],
+    rates: OutputPort,
+    sample_time: float,
+    latency: float,
+) -> tuple[dict[str, OutputPort], OutputPort]:
+    """Hold the measurements at k T and the motor rates from k T + latency on.
+
+    Systems that update at the same instant read each other's old values. So when the latency is a
+    whole number n of frames, `held_rates`, updating at k T too, reads what the samplers took a
+    frame earlier: they delay by n - 1 frames only, and for n = 0 there are none.
+    """
+    frames, phase = split_latency(sample_time, latency)
+    hold = builder.AddNamedSystem(
+        "held_rates", ZeroOrderHold(sample_time, rates.size(), offset_sec=phase)
+    )
+    builder.Connect(rates, hold.get_input_port())
+    delay = frames if phase > 0.0 else frames - 1
+    if delay < 0:
+        return measured, hold.get_output_port()
+    sampled = {}
+    for name, port in measured.items():
+        sampler = (
+            ZeroOrderHold(sample_time, port.size())
+            if delay == 0
+            else DiscreteTimeDelay(sample_time, delay + 1, port.size())
+        )
+        builder.AddNamedSystem(f"sampled_{name}", sampler)
+        builder.Connect(port, sampler.get_input_port())
+        sampled[name] = sampler.get_output_port()
+    return sampled, hold.get_output_port()
+
+
+def _add_noise(
+    builder: DiagramBuilder, name: str, port: InputPort, noise: bool, sample_time: float | None
+) -> None:
+    if not noise:
+        builder.ExportInput(port, name)
+        return
+    source = RandomSource(RandomDistribution.kGaussian, port.size(), sample_time or NOISE_PERIOD)
+    builder.Connect(builder.AddNamedSystem(name, source).get_output_port(), port)
+
+
+def _export_input(builder: DiagramBuilder, name: str, *systems: LeafSystem) -> None:
+    """Export one input that feeds the port of that name of several systems."""
+    index = builder.ExportInput(systems[0].GetInputPort(name), name)
+    for system in systems[1:]:
+        builder.ConnectInput(index, system.GetInputPort(name))
+
+
+def _finish(builder: DiagramBuilder, plant: Diagram, name: str) -> Diagram:
+    for port in ROBOT_OUTPUTS:
+        builder.ExportOutput(plant.GetOutputPort(port), port)
+    diagram = builder.Build()
+    diagram.set_name(name)
+    return diagram

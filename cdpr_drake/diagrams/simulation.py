@@ -1,0 +1,153 @@
+"""Simulating a diagram: a default that suits its modes, a watch over its limits, a record."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+from pydrake.systems.framework import Context, Diagram, EventStatus
+
+from cdpr_drake.diagrams.rest import robot_of
+from cdpr_drake.diagrams.watch import LimitWatch
+
+MAX_STEP = 0.01
+"""Default step of the fixed-step Runge-Kutta 3 integrator [s]: six to a period of the winches."""
+
+RECORDED = (
+    "pose",
+    "pose_error",
+    "pose_error_seen",
+    "desired_pose",
+    "tension_at_winch",
+    "tension_at_drawing_point",
+    "tension_at_attachment_point",
+    "measured_tension",
+    "tangents_at_drawing_point",
+    "dbeta",
+    "unstrained_length",
+    "motor_angles",
+    "motor_rates",
+    "motor_torques",
+)
+"""Ports that `simulate` records, those of them that a diagram has."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Record:
+    """What a run left behind.
+
+    Attributes:
+        time: (n,) [s].
+        signals: for each recorded output port its values (n, size).
+        context: the context at the end.
+        wall_time: how long the run took [s].
+        slack_cables: for each cable (counting from 1) that went slack, the first time [s].
+    """
+
+    time: np.ndarray
+    signals: dict[str, np.ndarray]
+    context: Context
+    wall_time: float
+    slack_cables: dict[int, float]
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Return the values (n, size) of a recorded output port."""
+        return self.signals[name]
+
+    @property
+    def real_time_factor(self) -> float:
+        """Simulated time over the time it took."""
+        return float(self.time[-1] - self.time[0]) / self.wall_time
+
+
+def make_simulator(
+    diagram: Diagram,
+    context: Context,
+    *,
+    max_step: float = MAX_STEP,
+    accuracy: float | None = None,
+) -> Simulator:
+    """Return a simulator with the integrator that suits these diagrams.
+
+    Args:
+        diagram: the diagram.
+        context: where it starts, e.g. from `rest_context`.
+        max_step: step of the fixed-step Runge-Kutta 3 integrator, or its largest step [s].
+        accuracy: for error control; fixed steps if None.
+    """
+    simulator = Simulator(diagram, context)
+    config = SimulatorConfig()
+    config.integration_scheme = "runge_kutta3"
+    config.max_step_size = max_step
+    config.use_error_control = accuracy is not None
+    if accuracy is not None:
+        config.accuracy = accuracy
+    ApplySimulatorConfig(config, simulator)
+    return simulator
+
+
+def simulate(
+    diagram: Diagram,
+    context: Context,
+    until: float,
+    *,
+    record: Iterable[str] | None = None,
+    every: float = 0.05,
+    max_step: float = MAX_STEP,
+    accuracy: float | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Record:
+    """Run a diagram to a time and return what was recorded.
+
+    Args:
+        diagram: a diagram of this package, or one built around it, with an output "pose".
+        context: where it starts; it is moved on to the end.
+        until: [s].
+        record: names of output ports; those of `RECORDED` that the diagram has if None.
+        every: period of the record [s]; it does not bound the step.
+        max_step: step of the integrator [s].
+        accuracy: for error control; fixed steps if None.
+        progress: called with the time at each record.
+
+    Raises:
+        CableError: a cable broke or has no equilibrium.
+        SimulationError: the platform left the hull of the drawing points, its pitch came within 5
+            degrees of 90, or a value is not finite.
+    """
+    names = RECORDED if record is None else record
+    ports = {n: diagram.GetOutputPort(n) for n in names if diagram.HasOutputPort(n)}
+    times: list[float] = []
+    values: dict[str, list[np.ndarray]] = {name: [] for name in ports}
+    watch = LimitWatch(robot_of(diagram))
+    pose = diagram.GetOutputPort("pose")
+    tension = diagram.GetOutputPort("tension_at_drawing_point")
+    start = context.get_time()
+
+    def monitor(now: Context) -> EventStatus:
+        t = now.get_time()
+        if watch.is_due(t):
+            watch.check_pose(t, pose.Eval(now))
+        if t >= start + len(times) * every - 1e-9:
+            watch.check_tensions(t, tension.Eval(now))
+            times.append(t)
+            for name, port in ports.items():
+                values[name].append(port.Eval(now))
+            if progress is not None:
+                progress(t)
+        return EventStatus.Succeeded()
+
+    simulator = make_simulator(diagram, context, max_step=max_step, accuracy=accuracy)
+    simulator.set_monitor(monitor)
+    begun = time.perf_counter()
+    simulator.Initialize()
+    simulator.AdvanceTo(until)
+    return Record(
+        time=np.array(times),
+        signals={name: np.array(v) for name, v in values.items()},
+        context=context,
+        wall_time=time.perf_counter() - begun,
+        slack_cables=watch.slack,
+    )

@@ -1,0 +1,56 @@
+"""The errors this package raises: each names the file and field, or the cable, time and value."""
+
+from __future__ import annotations
+
+
+class CdprError(Exception):
+    """Base of every error of this package; catching it catches them all."""
+
+
+class RobotFileError(CdprError, ValueError):
+    """A robot file cannot be used. Names the file and the field."""
+
+    def __init__(self, file: str, field: str, message: str) -> None:
+        super().__init__(f"{file}: {field}: {message}" if field else f"{file}: {message}")
+        self.file, self.field, self.message = file, field, message
+
+    def __reduce__(self):
+        return type(self), (self.file, self.field, self.message)
+
+
+class GeometryError(CdprError, ValueError):
+    """The geometry does not allow what was asked, e.g. a wrench matrix of rank below 6."""
+
+
+class TensionError(CdprError, ValueError):
+    """No tension distribution within the limits balances the wrench at a pose."""
+
+
+class EquilibriumError(CdprError, RuntimeError):
+    """No equilibrium was found; the message gives the residual and the limiting cable."""
+
+
+class LinearizationError(CdprError, ValueError):
+    """A diagram cannot be linearised; the message names the block in the way."""
+
+
+class CableError(CdprError, RuntimeError):
+    """A cable leaves what the model covers. `cable` counts from 1, as in the paper."""
+
+    def __init__(self, cable: int, time: float, message: str) -> None:
+        super().__init__(f"cable {cable} at t = {time:.6g} s: {message}")
+        self.cable, self.time, self.message = cable, time, message
+
+    def __reduce__(self):
+        return type(self), (self.cable, self.time, self.message)
+
+
+class SimulationError(CdprError, RuntimeError):
+    """A run left what the model covers. Names the quantity and the time."""
+
+    def __init__(self, quantity: str, time: float, message: str) -> None:
+        super().__init__(f"{quantity} at t = {time:.6g} s: {message}")
+        self.quantity, self.time, self.message = quantity, time, message
+
+    def __reduce__(self):
+        return type(self), (self.quantity, self.time, self.message)

@@ -1,0 +1,108 @@
+"""A whole robot's elastic catenaries: wrench, tensions and tangents from the platform's state."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.rotations import Array, rpy_rate_matrix, skew
+
+WIDTH = 14
+"""Columns of a cable's outputs, as in `kernels.catenary.cable_forces`."""
+
+
+class CableSet:
+    """All k cables of a robot between their winches and the platform.
+
+    Args:
+        robot: the robot.
+    """
+
+    def __init__(self, robot: CableRobot) -> None:
+        from cdpr_drake.model.kernels import catenary, platform
+
+        self._catenary, self._platform = catenary, platform
+        self.robot = robot
+        self.num_cables = robot.num_cables
+        cable = robot.cable
+        self._points = (
+            np.ascontiguousarray(robot.drawing_points, float),
+            np.ascontiguousarray(robot.attachment_points, float),
+        )
+        self._cable = (
+            float(robot.weight_per_metre),
+            cable.stiffness.as_array(),
+            np.ascontiguousarray(cable.drum_run, float),
+            float(cable.damping_time),
+        )
+        self._breaking_load = float(cable.breaking_load)
+
+    def __call__(self, state: Array, length: Array, rate: Array) -> tuple[Array, Array, int]:
+        """Return the wrench [torque; force] (6,) on the platform, the outputs (k, 14) and a status.
+
+        The wrench is at the platform's origin in W; status 0, or the number of the cable whose
+        catenary was not found, or minus the number of one at its breaking load.
+
+        Args:
+            state: (12,) [roll, pitch, yaw, x, y, z, omega, v] of the platform in W.
+            length: (k,) total unstrained lengths [m].
+            rate: (k,) their rates [m/s].
+        """
+        wrench, out = np.empty(6), np.empty((self.num_cables, WIDTH))
+        status = self._platform.platform_cable_forces(
+            state, length, rate, *self._points, *self._cable, self._breaking_load, wrench, out
+        )
+        return wrench, out, status
+
+    def with_jacobian(
+        self, state: Array, length: Array, rate: Array
+    ) -> tuple[Array, Array, int, Array, Array]:
+        """Return what a call returns, and the Jacobians of wrench and outputs.
+
+        Both are with respect to [state (12); length (k); rate (k)]: (6, 12 + 2 k) and
+        (k, 14, 12 + 2 k).
+
+        Args:
+            state: (12,) as above.
+            length: (k,) total unstrained lengths [m].
+            rate: (k,) their rates [m/s].
+        """
+        k = self.num_cables
+        drawing, attachment = self._points
+        p_WB, v_WB = np.empty((k, 3)), np.empty((k, 3))
+        self._platform.attachment_motion(state, attachment, p_WB, v_WB)
+        out, local = np.empty((k, WIDTH)), np.zeros((k, WIDTH, 8))
+        status = self._catenary.cable_forces_jacobian(
+            drawing, p_WB, v_WB, length, rate, *self._cable, out, local
+        )
+        if status == 0 and out[:, 3:5].max() >= self._breaking_load:
+            status = -1 - int(out[:, 3:5].max(axis=1).argmax())
+        EB = p_WB - state[3:6]
+        points = _point_jacobian(state, EB)
+        jacobian = np.zeros((k, WIDTH, 12 + 2 * k))
+        jacobian[:, :, :12] = local[:, :, :6] @ points
+        cables = np.arange(k)
+        jacobian[cables, :, 12 + cables] = local[:, :, 6]
+        jacobian[cables, :, 12 + k + cables] = local[:, :, 7]
+        force = out[:, :3]
+        wrench = np.concatenate([np.cross(EB, force).sum(0), force.sum(0)])
+        d_wrench = np.concatenate(
+            [(skew(EB) @ jacobian[:, :3]).sum(0), jacobian[:, :3].sum(0)], axis=0
+        )
+        arm = points[:, :3].copy()
+        arm[:, :, 3:6] = 0.0
+        d_wrench[:3, :12] -= (skew(force) @ arm).sum(0)
+        return wrench, out, status, d_wrench, jacobian
+
+
+def _point_jacobian(state: Array, EB: Array) -> Array:
+    """Return (k, 6, 12): change of [p_WB; v_WB] with the platform's state."""
+    k = len(EB)
+    turn = -skew(EB) @ rpy_rate_matrix(state[:3])
+    jacobian = np.zeros((k, 6, 12))
+    jacobian[:, :3, :3] = turn
+    jacobian[:, :3, 3:6] = np.eye(3)
+    jacobian[:, 3:, :3] = skew(state[6:9]) @ turn
+    jacobian[:, 3:, 6:9] = -skew(EB)
+    jacobian[:, 3:, 9:] = np.eye(3)
+    return jacobian

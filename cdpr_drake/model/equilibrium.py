@@ -1,0 +1,237 @@
+"""Exact statics on elastic catenaries: from a pose to rest tensions, and from lengths to a pose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydrake.math import RigidTransform, RotationMatrix
+
+from cdpr_drake.errors import EquilibriumError
+from cdpr_drake.model.kinematics import cable_geometry
+from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.rotations import Array, as_pose, exp_rotation, skew
+from cdpr_drake.model.statics import check_rank, distribute, wrench_matrix
+
+TOLERANCE = 1e-11
+"""Residual wrench relative to the weight (torques per metre of the platform) at an equilibrium."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RestState:
+    """A robot at rest.
+
+    Attributes:
+        X_WP: the pose.
+        unstrained_length: (k,) [m] with the run from drum to eyelet.
+        chord_tension: (k,) [N] horizontal tension over cos(beta0).
+        tension_at_drawing_point: (k,) [N].
+        tension_at_attachment_point: (k,) [N].
+        residual: largest unbalanced component over the weight, torques divided by 1 m.
+    """
+
+    X_WP: RigidTransform
+    unstrained_length: Array
+    chord_tension: Array
+    tension_at_drawing_point: Array
+    tension_at_attachment_point: Array
+    residual: float
+
+
+def rest_state(
+    robot: CableRobot, pose: RigidTransform | ArrayLike, rule: str = "minimum norm"
+) -> RestState:
+    """Return the robot at rest at a pose, its chord tensions chosen by a rule.
+
+    The tensions balance the platform's weight exactly, with the forces of the elastic catenary
+    (Irvine, Cable Structures, 1981), not of a simplified model.
+
+    Args:
+        robot: the robot.
+        pose: X_WP, or [roll, pitch, yaw, x, y, z] (rad, m).
+        rule: "minimum norm", or "within limits": inside the robot's tension limits and closest to
+            their middle.
+
+    Raises:
+        GeometryError: the wrench matrix has rank below 6.
+        TensionError: no such tensions.
+        EquilibriumError: the iteration did not converge.
+    """
+    from cdpr_drake.model.kernels.catenary import irvine_from_horizontal
+
+    X_WP = as_pose(pose)
+    geometry = cable_geometry(robot, X_WP)
+    matrix = wrench_matrix(geometry)
+    check_rank(matrix)
+    weight = gravity_wrench(robot, X_WP)
+    w, cable = robot.weight_per_metre, robot.cable
+    k = robot.num_cables
+    sin_beta0 = geometry.Bz / geometry.L
+    sag = 0.5 * w * geometry.L  # V_B - T sin(beta0): the part of theta_B that is not along u
+    T = np.zeros(k)
+    V_B, l0, T_A = np.zeros(k), np.zeros(k), np.zeros(k)
+    EA = np.full(k, cable.stiffness(robot.mass * robot.gravity / k))
+    for _ in range(200):
+        rest = np.concatenate([np.cross(geometry.EB, geometry.z), np.tile(geometry.z, (k, 1))], 1)
+        previous = T
+        T = distribute(robot, matrix, weight - rest.T @ sag, rule, X_WP)
+        H = T * geometry.Bx / geometry.L
+        for i in range(k):
+            V_B[i], l0[i], status = irvine_from_horizontal(
+                geometry.Bx[i], geometry.Bz[i], H[i], w, EA[i]
+            )
+            if status:
+                raise EquilibriumError(f"cable {i + 1} has no catenary at H = {H[i]:.3g} N")
+        sag = V_B - T * sin_beta0
+        T_A = np.hypot(H, V_B - w * l0)
+        EA = np.array([cable.stiffness(t) for t in T_A])
+        if np.max(np.abs(T - previous)) <= 1e-14 * np.max(np.abs(T)):
+            break
+    length = l0 + cable.drum_run / (1.0 + T_A / EA)
+    wrench, _, out = platform_balance(robot, X_WP, length)
+    residual = _relative(robot, wrench)
+    if not residual <= 1e3 * TOLERANCE:
+        raise EquilibriumError(
+            f"no rest state found: residual {residual:.2e} of the weight; limiting cable "
+            f"{int(np.argmin(T)) + 1} (chord tension {T.min():.2f} N)"
+        )
+    return _state(robot, X_WP, length, out, residual)
+
+
+def gravity_wrench(robot: CableRobot, X_WP: RigidTransform) -> Array:
+    """Return the weight's wrench [torque; force] (6,) at the platform's origin, in W.
+
+    Args:
+        robot: the robot.
+        X_WP: the pose.
+    """
+    force = np.array([0.0, 0.0, -robot.mass * robot.gravity])
+    return np.concatenate([np.cross(X_WP.rotation() @ robot.center_of_mass, force), force])
+
+
+def platform_balance(
+    robot: CableRobot, X_WP: RigidTransform, length: Array
+) -> tuple[Array, Array, Array]:
+    """Return the wrench on the platform at rest, its change with the pose, and the cables' state.
+
+    Args:
+        robot: the robot.
+        X_WP: the pose.
+        length: (k,) [m] total unstrained lengths.
+
+    Returns:
+        wrench [torque; force] (6,) of cables and weight at the platform's origin, in W; its
+        derivative (6, 6) with respect to a small motion [rotation; translation] in W; the cables'
+        outputs (k, 14), columns as in `kernels.catenary.cable_forces`.
+
+    Raises:
+        EquilibriumError: a cable's catenary was not found.
+    """
+    from cdpr_drake.model.kernels.catenary import cable_forces_jacobian
+
+    k = robot.num_cables
+    EB = robot.attachment_points @ X_WP.rotation().matrix().T
+    out, jacobian = np.zeros((k, 14)), np.zeros((k, 14, 8))
+    status = cable_forces_jacobian(
+        robot.drawing_points, EB + X_WP.translation(), np.zeros((k, 3)), length, np.zeros(k),
+        robot.weight_per_metre, robot.cable.stiffness.as_array(), robot.cable.drum_run,
+        robot.cable.damping_time, out, jacobian,
+    )  # fmt: skip
+    if status:
+        raise EquilibriumError(f"cable {status} has no catenary at this pose and length")
+    force = out[:, :3]
+    weight = gravity_wrench(robot, X_WP)
+    wrench = weight + np.concatenate([np.cross(EB, force).sum(0), force.sum(0)])
+    motion = np.concatenate([-skew(EB), np.broadcast_to(np.eye(3), (k, 3, 3))], axis=2)
+    d_force = jacobian[:, :3, :3] @ motion
+    stiffness = np.zeros((6, 6))
+    stiffness[3:] = d_force.sum(0)
+    stiffness[:3] = (skew(EB) @ d_force).sum(0)
+    stiffness[:3, :3] += (skew(force) @ skew(EB)).sum(0)
+    EG = X_WP.rotation() @ robot.center_of_mass
+    stiffness[:3, :3] += skew(weight[3:]) @ skew(EG)
+    return wrench, stiffness, out
+
+
+def forward_kinematics(
+    robot: CableRobot,
+    length: ArrayLike,
+    guess: RigidTransform | ArrayLike,
+    max_iterations: int = 200,
+) -> RestState:
+    """Return the equilibrium pose of the platform hanging on cables of given unstrained lengths.
+
+    Descends the potential energy: Newton steps with the exact stiffness of the catenaries, made
+    positive definite, each as long as the energy falls along it. So the equilibrium is stable.
+
+    Args:
+        robot: the robot.
+        length: (k,) [m] total unstrained lengths, run from drum to eyelet included.
+        guess: a pose to start from, X_WP or [roll, pitch, yaw, x, y, z] (rad, m).
+        max_iterations: after how many evaluations to give up.
+
+    Raises:
+        EquilibriumError: no equilibrium was found from this guess; names the residual and the
+            cable of least tension.
+    """
+    length = np.asarray(length, float)
+    if length.shape != (robot.num_cables,) or not np.all(length > 0.0):
+        raise ValueError(f"lengths must be {robot.num_cables} positive numbers, got {length}")
+    X = as_pose(guess)
+    wrench, stiffness, out = platform_balance(robot, X, length)
+    for _ in range(max_iterations):
+        if _relative(robot, wrench) <= TOLERANCE:
+            break
+        step = _descent_step(stiffness, wrench)
+        fraction, descent = 1.0, float(step @ wrench)
+        for _ in range(30):
+            candidate = _moved(X, fraction * step)
+            trial = platform_balance(robot, candidate, length)
+            ahead = float(step @ trial[0])
+            if abs(ahead) <= 0.5 * descent or ahead > 0.0:
+                break
+            # Beyond the lowest point along the step: go back by the secant of the slope.
+            fraction *= max(0.1, descent / (descent - ahead))
+        if np.linalg.norm(fraction * step) < 1e-14:
+            break  # round-off of stiff cables
+        X, (wrench, stiffness, out) = candidate, trial
+    residual = _relative(robot, wrench)
+    if not residual <= 1e3 * TOLERANCE:
+        slackest = int(np.argmin(out[:, 3]))
+        raise EquilibriumError(
+            f"no equilibrium for these lengths: residual {residual:.2e} of the weight; limiting "
+            f"cable {slackest + 1} ({out[slackest, 3]:.2f} N at the drawing point)"
+        )
+    return _state(robot, X, length, out, residual)
+
+
+def _state(
+    robot: CableRobot, X_WP: RigidTransform, length: Array, out: Array, residual: float
+) -> RestState:
+    geometry = cable_geometry(robot, X_WP)
+    return RestState(
+        X_WP=X_WP,
+        unstrained_length=length,
+        chord_tension=out[:, 12] * geometry.L / geometry.Bx,
+        tension_at_drawing_point=out[:, 3],
+        tension_at_attachment_point=out[:, 4],
+        residual=residual,
+    )
+
+
+def _descent_step(stiffness: Array, wrench: Array) -> Array:
+    """Return a motion [rotation; translation] that lowers the energy, limited in size."""
+    values, vectors = np.linalg.eigh(-0.5 * (stiffness + stiffness.T))
+    values = np.maximum(np.abs(values), 1e-9 * np.abs(values).max())
+    step = vectors @ ((vectors.T @ wrench) / values)
+    return step / max(1.0, np.linalg.norm(step[:3]) / 0.3, np.linalg.norm(step[3:]) / 1.0)
+
+
+def _moved(X: RigidTransform, step: Array) -> RigidTransform:
+    R = RotationMatrix.ProjectToRotationMatrix(exp_rotation(step[:3]) @ X.rotation().matrix())
+    return RigidTransform(R, X.translation() + step[3:])
+
+
+def _relative(robot: CableRobot, wrench: Array) -> float:
+    return float(np.max(np.abs(wrench)) / (robot.mass * robot.gravity))

@@ -1,0 +1,66 @@
+"""All cables on one platform: from the platform's state to the wrench on it.
+
+Arguments in common: state (12,) [roll, pitch, yaw, x, y, z, omega, v] of the platform in W;
+drawing, attachment (k, 3) [m]: p_WA and p_PB; p_WB, v_WB (k, 3): attachment points and their
+velocities in W; length, rate (k,): total unstrained lengths and their rates; w [N/m]; stiffness
+(3,); run (k,) [m]; damping_time [s]; limit [N]: breaking load; wrench (6,) and out (k, 14):
+results.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdpr_drake.model.kernels import jit
+from cdpr_drake.model.kernels.catenary import cable_forces
+from cdpr_drake.model.kernels.servo import rpy_matrix
+
+
+@jit
+def attachment_motion(state, attachment, p_WB, v_WB):
+    """Write positions and velocities (k, 3) of the attachment points in W.
+
+    state = [roll, pitch, yaw, x, y, z, omega (3), v (3)] of the platform in W.
+    """
+    R = np.zeros((3, 3))
+    rpy_matrix(state[0], state[1], state[2], R)
+    wx, wy, wz = state[6], state[7], state[8]
+    for i in range(attachment.shape[0]):
+        bx, by, bz = attachment[i, 0], attachment[i, 1], attachment[i, 2]
+        ex = R[0, 0] * bx + R[0, 1] * by + R[0, 2] * bz
+        ey = R[1, 0] * bx + R[1, 1] * by + R[1, 2] * bz
+        ez = R[2, 0] * bx + R[2, 1] * by + R[2, 2] * bz
+        p_WB[i, 0], p_WB[i, 1], p_WB[i, 2] = ex + state[3], ey + state[4], ez + state[5]
+        v_WB[i, 0] = state[9] + wy * ez - wz * ey
+        v_WB[i, 1] = state[10] + wz * ex - wx * ez
+        v_WB[i, 2] = state[11] + wx * ey - wy * ex
+
+
+@jit
+def platform_cable_forces(
+    state, length, rate, drawing, attachment, w, stiffness, run, damping_time, limit, wrench, out
+):
+    """Write the cables' wrench [torque; force] at the platform's origin, and their outputs.
+
+    Arguments and columns of out (k, 14) as in `cable_forces`; returns its status, or minus the
+    number of a cable whose tension is not below the limit.
+    """
+    k = drawing.shape[0]
+    p_WB = np.empty((k, 3))
+    v_WB = np.empty((k, 3))
+    attachment_motion(state, attachment, p_WB, v_WB)
+    status = cable_forces(drawing, p_WB, v_WB, length, rate, w, stiffness, run, damping_time, out)
+    for a in range(6):
+        wrench[a] = 0.0
+    for i in range(k):
+        ex, ey, ez = p_WB[i, 0] - state[3], p_WB[i, 1] - state[4], p_WB[i, 2] - state[5]
+        fx, fy, fz = out[i, 0], out[i, 1], out[i, 2]
+        wrench[0] += ey * fz - ez * fy
+        wrench[1] += ez * fx - ex * fz
+        wrench[2] += ex * fy - ey * fx
+        wrench[3] += fx
+        wrench[4] += fy
+        wrench[5] += fz
+        if status == 0 and not max(out[i, 3], out[i, 4]) < limit:
+            status = -i - 1
+    return status

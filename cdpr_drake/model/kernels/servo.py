@@ -1,0 +1,330 @@
+"""The control law of eqs. (14), (18) and (19), cable by cable.
+
+Every function takes real or complex numbers: evaluated at z + i h, the imaginary part divided by h
+is the exact derivative, so that one source gives the value and the Jacobian.
+
+Arguments in common: model, order: the cable model's index and the order of its series; roll,
+pitch, yaw: extrinsic x-y-z angles [rad]; R (3, 3): rotation matrix; G (6, 6), b (6,): matrix and
+right-hand side; gain [1/s]; limits [m/s, rad/s] of speed; z, s, out, jacobian, rates: inputs and
+results named in each function; drawing, attachment (k, 3) [m]: p_WA and p_PB; body = [mass g, x_G,
+y_G, z_G, w]; stiffness (3,); run (k,) [m]; X_PM (4, 3) = [R_PM; p_PM]; R_M, EM: orientation of the
+target frame and offset from E to M, in W; twist (6,) = [omega; v].
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdpr_drake.model.kernels import jit
+from cdpr_drake.model.kernels.cable_models import length_and_row, run_row
+
+SLSM = 3
+RANK_DEFICIENT = -1
+STEP = 1e-40
+
+
+@jit
+def rpy_matrix(roll, pitch, yaw, R):
+    """Write the rotation matrix of extrinsic x-y-z angles into R (3, 3)."""
+    cr, sr = np.cos(roll), np.sin(roll)
+    cp, sp = np.cos(pitch), np.sin(pitch)
+    cy, sy = np.cos(yaw), np.sin(yaw)
+    R[0, 0], R[0, 1], R[0, 2] = cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr
+    R[1, 0], R[1, 1], R[1, 2] = sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr
+    R[2, 0], R[2, 1], R[2, 2] = -sp, cp * sr, cp * cr
+
+
+@jit
+def rotation_log(R, out):
+    """Write the rotation vector of R into out (3,), by way of the quaternion's largest part."""
+    trace = R[0, 0] + R[1, 1] + R[2, 2]
+    if trace.real > 0.0:
+        w = 0.5 * np.sqrt(1.0 + trace)
+        x = (R[2, 1] - R[1, 2]) / (4.0 * w)
+        y = (R[0, 2] - R[2, 0]) / (4.0 * w)
+        z = (R[1, 0] - R[0, 1]) / (4.0 * w)
+    elif R[0, 0].real >= R[1, 1].real and R[0, 0].real >= R[2, 2].real:
+        x = 0.5 * np.sqrt(1.0 + R[0, 0] - R[1, 1] - R[2, 2])
+        w = (R[2, 1] - R[1, 2]) / (4.0 * x)
+        y = (R[0, 1] + R[1, 0]) / (4.0 * x)
+        z = (R[0, 2] + R[2, 0]) / (4.0 * x)
+    elif R[1, 1].real >= R[2, 2].real:
+        y = 0.5 * np.sqrt(1.0 - R[0, 0] + R[1, 1] - R[2, 2])
+        w = (R[0, 2] - R[2, 0]) / (4.0 * y)
+        x = (R[0, 1] + R[1, 0]) / (4.0 * y)
+        z = (R[1, 2] + R[2, 1]) / (4.0 * y)
+    else:
+        z = 0.5 * np.sqrt(1.0 - R[0, 0] - R[1, 1] + R[2, 2])
+        w = (R[1, 0] - R[0, 1]) / (4.0 * z)
+        x = (R[0, 2] + R[2, 0]) / (4.0 * z)
+        y = (R[1, 2] + R[2, 1]) / (4.0 * z)
+    if w.real < 0.0:
+        w, x, y, z = -w, -x, -y, -z
+    n2 = x * x + y * y + z * z
+    if n2.real < 1e-8:
+        r = n2 / (w * w)
+        factor = 2.0 / w * (1.0 - r / 3.0 + r * r / 5.0)
+    else:
+        n = np.sqrt(n2)
+        if n.real < w.real:
+            factor = 2.0 * np.arctan(n / w) / n
+        else:
+            factor = (np.pi - 2.0 * np.arctan(w / n)) / n
+    out[0], out[1], out[2] = factor * x, factor * y, factor * z
+
+
+@jit
+def solve_symmetric(G, b):
+    """Solve G x = b in place of b by LDL^T, for G symmetric (6, 6); False if G is singular."""
+    n = b.shape[0]
+    for j in range(n):
+        scale = abs(G[j, j].real)
+        d = G[j, j]
+        for m in range(j):
+            d = d - G[j, m] * G[j, m] * G[m, m]
+        if not d.real > 1e-11 * scale:
+            return False
+        G[j, j] = d
+        for i in range(j + 1, n):
+            v = G[i, j]
+            for m in range(j):
+                v = v - G[i, m] * G[j, m] * G[m, m]
+            G[i, j] = v / d
+    for i in range(n):
+        for m in range(i):
+            b[i] = b[i] - G[i, m] * b[m]
+    for i in range(n):
+        b[i] = b[i] / G[i, i]
+    for i in range(n - 1, -1, -1):
+        for m in range(i + 1, n):
+            b[i] = b[i] - G[m, i] * b[m]
+    return True
+
+
+@jit
+def length_rates(
+    model, order, R, p, twist, T_A, cos_alpha, drawing, attachment, body, stiffness, run, rates
+):
+    """Write the rates of the unstrained lengths (eq. 13) for a twist [omega; v] of E in W.
+
+    R, p: the pose; T_A, cos_alpha (k,): tension at the drawing points and cosine of the tangents'
+    elevation there, so that H = T_A cos_alpha (eq. 16); drawing, attachment (k, 3); body =
+    [mass g, x_G, y_G, z_G, w]; stiffness (3,); run (k,): drum-to-eyelet runs that the law models
+    (zero: it does not). Returns False when the wrench matrix has rank below 6.
+    """
+    k = drawing.shape[0]
+    weight, w = body[0], body[4]
+    wx, wy, wz = twist[0], twist[1], twist[2]
+    D = np.zeros((6, k), R.dtype)
+    change = np.zeros(6, R.dtype)
+    dH = np.zeros(k, R.dtype)
+    for i in range(k):
+        bx, by, bz = attachment[i, 0], attachment[i, 1], attachment[i, 2]
+        ex = R[0, 0] * bx + R[0, 1] * by + R[0, 2] * bz
+        ey = R[1, 0] * bx + R[1, 1] * by + R[1, 2] * bz
+        ez = R[2, 0] * bx + R[2, 1] * by + R[2, 2] * bz
+        ax = ex + p[0] - drawing[i, 0]
+        ay = ey + p[1] - drawing[i, 1]
+        Bz = ez + p[2] - drawing[i, 2]
+        Bx = np.sqrt(ax * ax + ay * ay)
+        L = np.sqrt(Bx * Bx + Bz * Bz)
+        cx, cy = ax / Bx, ay / Bx
+        # Velocity of B, its components in the cable's plane and across it.
+        qx, qy, qz = wy * ez - wz * ey, wz * ex - wx * ez, wx * ey - wy * ex
+        vx, vy, vz = twist[3] + qx, twist[4] + qy, twist[5] + qz
+        dBx = cx * vx + cy * vy
+        dgamma = (cx * vy - cy * vx) / Bx
+        tension = T_A[i] if T_A[i].real > 0.0 else 0.0 * T_A[i]
+        H = tension * cos_alpha[i]
+        slack = w * Bx.real / 20.0
+        if not H.real > slack:
+            H = slack + 0.0 * H
+        EA = stiffness[0] + 0.0 * tension
+        if stiffness[1] != 0.0:
+            EA = stiffness[0] - stiffness[1] / (tension + stiffness[2])
+        _, N1, N2, N3 = length_and_row(model, order, Bx, Bz, H, w, EA)
+        if run[i] != 0.0:
+            M1, M2, M3 = run_row(run[i], EA, Bx, Bz, H, w)
+            N1, N2, N3 = N1 + M1, N2 + M2, N3 + M3
+        rates[i] = N1 * dBx + N2 * vz
+        if model == SLSM and run[i] == 0.0:
+            continue
+        dH[i] = N3
+        t = Bz / Bx
+        D[0, i], D[1, i], D[2, i] = ey * t - ez * cy, ez * cx - ex * t, ex * cy - ey * cx
+        D[3, i], D[4, i], D[5, i] = cx, cy, t
+        # Change of theta_B = H (x_A + t z) + (w L / 2) z at constant H, and of its moment about E.
+        dL = (Bx * dBx + Bz * vz) / L
+        gx, gy = -H * cy * dgamma, H * cx * dgamma
+        gz = H * (vz - t * dBx) / Bx + 0.5 * w * dL
+        fx, fy, fz = H * cx, H * cy, H * t + 0.5 * w * L
+        change[0] += qy * fz - qz * fy + ey * gz - ez * gy
+        change[1] += qz * fx - qx * fz + ez * gx - ex * gz
+        change[2] += qx * fy - qy * fx + ex * gy - ey * gx
+        change[3] += gx
+        change[4] += gy
+        change[5] += gz
+    if model == SLSM and not np.any(run):
+        return True
+    # The weight's moment changes as G turns about E: d(EG x m g) = (omega x EG) x m g.
+    Gx = R[0, 0] * body[1] + R[0, 1] * body[2] + R[0, 2] * body[3]
+    Gy = R[1, 0] * body[1] + R[1, 1] * body[2] + R[1, 2] * body[3]
+    Gz = R[2, 0] * body[1] + R[2, 1] * body[2] + R[2, 2] * body[3]
+    change[0] += (wz * Gx - wx * Gz) * weight
+    change[1] -= (wy * Gz - wz * Gy) * weight
+    gram = np.zeros((6, 6), R.dtype)
+    for a in range(6):
+        for b in range(a + 1):
+            for i in range(k):
+                gram[a, b] += D[a, i] * D[b, i]
+    if not solve_symmetric(gram, change):
+        return False
+    for i in range(k):
+        rate = 0.0 * change[0]
+        for a in range(6):
+            rate -= D[a, i] * change[a]
+        rates[i] += dH[i] * rate
+    return True
+
+
+@jit
+def target_error(pose, desired, X_PM, R_M, EM, s):
+    """Write the pose error s = [s_w; s_t] (6,), R_WM (3, 3) and EM (3,) in W.
+
+    pose, desired: [roll, pitch, yaw, x, y, z]; X_PM (4, 3) = [R_PM; p_PM].
+    """
+    R = np.zeros((3, 3), pose.dtype)
+    R_d = np.zeros((3, 3), pose.dtype)
+    R_Md = np.zeros((3, 3), pose.dtype)
+    error = np.zeros((3, 3), pose.dtype)
+    step = np.zeros(3, pose.dtype)
+    rpy_matrix(pose[0], pose[1], pose[2], R)
+    rpy_matrix(desired[0], desired[1], desired[2], R_d)
+    for a in range(3):
+        for b in range(3):
+            EM[a] += R[a, b] * X_PM[3, b]
+            step[a] += R_d[a, b] * X_PM[3, b]
+            for c in range(3):
+                R_M[a, b] += R[a, c] * X_PM[c, b]
+                R_Md[a, b] += R_d[a, c] * X_PM[c, b]
+        step[a] += desired[3 + a] - pose[3 + a] - EM[a]
+    for a in range(3):
+        for b in range(3):
+            s[3 + a] += R_M[b, a] * step[b]
+            for c in range(3):
+                error[a, b] += R_M[c, a] * R_Md[c, b]
+    rotation_log(error, s)
+
+
+@jit
+def pose_error(z, X_PM, out):
+    """Write s = [s_w; s_t] (6,) for z = [pose (6); desired pose (6)]."""
+    R_M = np.zeros((3, 3), z.dtype)
+    EM = np.zeros(3, z.dtype)
+    target_error(z[0:6], z[6:12], X_PM, R_M, EM, out)
+
+
+@jit
+def pose_error_jacobian(z, X_PM, out, jacobian):
+    """Write s and its Jacobian (6, 12) with respect to z, by complex steps."""
+    zc = np.zeros(12, np.complex128)
+    for j in range(12):
+        zc[j] = z[j]
+    for j in range(12):
+        zc[j] = zc[j] + STEP * 1j
+        yc = np.zeros(6, np.complex128)
+        pose_error(zc, X_PM, yc)
+        zc[j] = z[j]
+        for i in range(6):
+            jacobian[i, j] = yc[i].imag / STEP
+            out[i] = yc[i].real
+
+
+@jit
+def motor_rates(
+    model, order, gain, limits, z, drawing, attachment, body, stiffness, run, X_PM, out
+):
+    """Evaluate the law: out = [motor rates (k); s_w; s_t], the rates times the transmission.
+
+    z = [pose (6); desired pose (6); desired twist (6); T_A (k); tangents at A (3 k)]; X_PM (4, 3) =
+    [R_PM; p_PM]; limits = [speed, angular speed]. Returns False at a rank below 6.
+    """
+    k = drawing.shape[0]
+    R = np.zeros((3, 3), z.dtype)
+    R_M = np.zeros((3, 3), z.dtype)
+    EM = np.zeros(3, z.dtype)
+    s = np.zeros(6, z.dtype)
+    rpy_matrix(z[0], z[1], z[2], R)
+    target_error(z[0:6], z[6:12], X_PM, R_M, EM, s)
+    # tau = lambda (s_t + s_t x s_w, s_w) in M, taken to E in W (D_t), plus the feed-forward.
+    vx = gain * (s[3] + s[4] * s[2] - s[5] * s[1])
+    vy = gain * (s[4] + s[5] * s[0] - s[3] * s[2])
+    vz = gain * (s[5] + s[3] * s[1] - s[4] * s[0])
+    twist = np.zeros(6, z.dtype)
+    for a in range(3):
+        twist[a] = gain * (R_M[a, 0] * s[0] + R_M[a, 1] * s[1] + R_M[a, 2] * s[2]) + z[12 + a]
+        twist[3 + a] = R_M[a, 0] * vx + R_M[a, 1] * vy + R_M[a, 2] * vz + z[15 + a]
+    # The feed-forward is the velocity of a rigid frame through the desired pose: at M it is
+    # v* + omega* x (M - E*); so that E moves with that less omega x EM.
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        twist[3 + a] -= twist[b] * EM[c] - twist[c] * EM[b]
+        offset_b = EM[b] + z[3 + b] - z[9 + b]
+        offset_c = EM[c] + z[3 + c] - z[9 + c]
+        twist[3 + a] += z[12 + b] * offset_c - z[12 + c] * offset_b
+    limit_twist(limits, EM, twist)
+    cos_alpha = np.zeros(k, z.dtype)
+    for i in range(k):
+        ux, uy, uz = z[18 + k + 3 * i], z[19 + k + 3 * i], z[20 + k + 3 * i]
+        horizontal = ux * ux + uy * uy
+        if horizontal.real > 0.0:
+            cos_alpha[i] = np.sqrt(horizontal / (horizontal + uz * uz))
+    for a in range(6):
+        out[k + a] = s[a]
+    return length_rates(
+        model, order, R, z[3:6], twist, z[18 : 18 + k], cos_alpha,
+        drawing, attachment, body, stiffness, run, out,
+    )  # fmt: skip
+
+
+@jit
+def limit_twist(limits, EM, twist):
+    """Scale the twist [omega; v] of E so that M keeps within the speed limits (m/s, rad/s)."""
+    vx = twist[3] + twist[1] * EM[2] - twist[2] * EM[1]
+    vy = twist[4] + twist[2] * EM[0] - twist[0] * EM[2]
+    vz = twist[5] + twist[0] * EM[1] - twist[1] * EM[0]
+    speed2 = vx * vx + vy * vy + vz * vz
+    angular2 = twist[0] * twist[0] + twist[1] * twist[1] + twist[2] * twist[2]
+    over = speed2 / (limits[0] * limits[0])
+    over_angular = angular2 / (limits[1] * limits[1])
+    if over_angular.real > over.real:
+        over = over_angular
+    if over.real > 1.0:
+        scale = 1.0 / np.sqrt(over)
+        for a in range(6):
+            twist[a] = twist[a] * scale
+
+
+@jit
+def motor_rates_jacobian(
+    model, order, gain, limits, z, drawing, attachment, body, stiffness, run, X_PM, out, jacobian
+):
+    """Evaluate the law and its Jacobian (k + 6, n) with respect to z (n,), by complex steps."""
+    n = z.shape[0]
+    zc = np.zeros(n, np.complex128)
+    yc = np.zeros(out.shape[0], np.complex128)
+    for j in range(n):
+        zc[j] = z[j]
+    for j in range(n):
+        zc[j] = zc[j] + STEP * 1j
+        for i in range(out.shape[0]):
+            yc[i] = 0.0
+        if not motor_rates(
+            model, order, gain, limits, zc, drawing, attachment, body, stiffness, run, X_PM, yc
+        ):
+            return False
+        zc[j] = z[j]
+        for i in range(out.shape[0]):
+            jacobian[i, j] = yc[i].imag / STEP
+            out[i] = yc[i].real
+    return True

@@ -1,0 +1,101 @@
+"""Rotations as the control law needs them: rotation vectors, pose vectors, their derivatives.
+
+A pose vector is [roll, pitch, yaw, x, y, z] (rad, m) of X_WP, Drake's extrinsic x-y-z angles; a
+rotation vector is the axis times the angle, the paper's u theta.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+
+Array = NDArray[np.float64]
+
+
+def skew(a: ArrayLike) -> Array:
+    """Return the cross-product matrix [a]x of a 3-vector `a`, or of each row of an (n, 3) array."""
+    a = np.asarray(a, float)
+    zero = np.zeros(a.shape[:-1])
+    x, y, z = a[..., 0], a[..., 1], a[..., 2]
+    return np.stack(
+        [
+            np.stack([zero, -z, y], -1),
+            np.stack([z, zero, -x], -1),
+            np.stack([-y, x, zero], -1),
+        ],
+        -2,
+    )
+
+
+def exp_rotation(rotation_vector: ArrayLike) -> Array:
+    """Return the (3, 3) rotation matrix of a `rotation_vector` (3,) [rad] (Rodrigues' formula)."""
+    phi = np.asarray(rotation_vector, float)
+    theta = float(np.linalg.norm(phi))
+    K = skew(phi)
+    half = np.sinc(theta / (2.0 * np.pi))
+    return np.eye(3) + np.sinc(theta / np.pi) * K + 0.5 * half**2 * (K @ K)
+
+
+def log_rotation(R: ArrayLike) -> Array:
+    """Return the rotation vector (3,) [rad], angle in [0, pi], of a rotation matrix `R` (3, 3).
+
+    Taken by way of the quaternion, which keeps full precision near 0 and near pi.
+    """
+    q = RotationMatrix(np.asarray(R, float)).ToQuaternion()
+    w, v = q.w(), q.xyz()
+    if w < 0.0:
+        w, v = -w, -v
+    n = float(np.linalg.norm(v))
+    if n < 1e-8:
+        return 2.0 * v / w
+    return 2.0 * np.arctan2(n, w) / n * v
+
+
+def rotation_interaction_matrix(rotation_vector: ArrayLike) -> Array:
+    """Return L_w (3, 3) with d(s_w)/dt = -L_w omega for s_w = log(R_MM*), omega of M in M.
+
+    The matrix L_w of section 5 (Malis, Chaumette, Boudet 1999) for the error taken from the
+    current to the desired frame: its theta/2 term is negative.
+
+    Args:
+        rotation_vector: s_w (3,) [rad].
+    """
+    phi = np.asarray(rotation_vector, float)
+    theta = float(np.linalg.norm(phi))
+    K = skew(phi)
+    if theta < 1e-2:
+        square = 1.0 / 12.0 + theta**2 / 720.0 + theta**4 / 30240.0
+    else:
+        square = (1.0 - 0.5 * theta / np.tan(0.5 * theta)) / theta**2
+    return np.eye(3) - 0.5 * K + square * (K @ K)
+
+
+def pose_to_vector(X_WP: RigidTransform) -> Array:
+    """Return [roll, pitch, yaw, x, y, z] (rad, m) of the pose `X_WP`."""
+    return np.concatenate([RollPitchYaw(X_WP.rotation()).vector(), X_WP.translation()])
+
+
+def vector_to_pose(pose: ArrayLike) -> RigidTransform:
+    """Return the RigidTransform X_WP of a `pose` vector [roll, pitch, yaw, x, y, z] (rad, m)."""
+    pose = np.asarray(pose, float)
+    if pose.shape != (6,) or not np.all(np.isfinite(pose)):
+        raise ValueError(f"a pose is six finite numbers [roll, pitch, yaw, x, y, z], got {pose}")
+    return RigidTransform(RollPitchYaw(pose[:3]), pose[3:])
+
+
+def as_pose(pose: RigidTransform | ArrayLike) -> RigidTransform:
+    """Return X_WP of a `pose` given as RigidTransform or as [roll, pitch, yaw, x, y, z]."""
+    return pose if isinstance(pose, RigidTransform) else vector_to_pose(pose)
+
+
+def rpy_rate_matrix(rpy: ArrayLike) -> Array:
+    """Return E (3, 3) with omega_W = E d(rpy)/dt, for angles `rpy` (3,) [rad]."""
+    _, p, y = np.asarray(rpy, float)
+    return np.array(
+        [
+            [np.cos(y) * np.cos(p), -np.sin(y), 0.0],
+            [np.sin(y) * np.cos(p), np.cos(y), 0.0],
+            [-np.sin(p), 0.0, 1.0],
+        ]
+    )

@@ -1,0 +1,279 @@
+"""The balance of the platform on sagging cables, and the choice of tensions (A.2).
+
+The simplified static model of Gouttefarde et al. (ICRA 2012), behind the paper's appendix A.2: the
+force applied to a cable at B is theta_B = H (x_A + tan(beta0) z) + (w L / 2) z: half of its weight
+hangs on the platform. Wrenches are [torque; force] at the platform's origin.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydrake.math import RigidTransform
+
+from cdpr_drake.errors import GeometryError, TensionError
+from cdpr_drake.model.kinematics import D_B, CableGeometry, D_Bf, D_u, cable_geometry
+from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.rotations import Array, as_pose, skew
+
+RANK_TOLERANCE = 1e-6
+
+
+def wrench_matrix(geometry: CableGeometry) -> Array:
+    """Return (6, k): wrench [torque; force] on the cables per unit of chord tension, (EB x u; u).
+
+    Args:
+        geometry: the chords at a pose.
+    """
+    return np.concatenate([np.cross(geometry.EB, geometry.u), geometry.u], axis=1).T
+
+
+def D_theta(geometry: CableGeometry) -> Array:
+    """Return (6, k): the wrench matrix per unit of horizontal tension, (EB x u; u) / cos(beta0).
+
+    Args:
+        geometry: the chords at a pose.
+    """
+    return wrench_matrix(geometry) * (geometry.L / geometry.Bx)
+
+
+def check_rank(matrix: Array) -> None:
+    """Raise GeometryError unless a wrench `matrix` (6, k) has rank 6: the law cannot do without."""
+    singular = np.linalg.svd(matrix, compute_uv=False)
+    if matrix.shape[1] < 6 or singular[-1] < RANK_TOLERANCE * singular[0]:
+        raise GeometryError(
+            f"the wrench matrix of the {matrix.shape[1]} cables has rank below 6 "
+            f"(singular values {np.array2string(singular, precision=3)}): "
+            "the platform's six degrees of freedom cannot all be controlled"
+        )
+
+
+def weight_wrench(robot: CableRobot, geometry: CableGeometry) -> Array:
+    """Return (6,) [torque; force]: what the chord tensions must balance, weight of half cables off.
+
+    The right-hand side of D_theta H = (EG x m g; m g) - sum (w L / 2) (EB x z; z).
+
+    Args:
+        robot: the robot.
+        geometry: the chords at the pose; its frame is the result's.
+    """
+    weight = -robot.mass * robot.gravity * geometry.z
+    EG = geometry.R_FP @ robot.center_of_mass
+    half = 0.5 * robot.weight_per_metre * geometry.L[:, None] * geometry.z
+    torque = np.cross(EG, weight) - np.cross(geometry.EB, half).sum(0)
+    return np.concatenate([torque, weight - half.sum(0)])
+
+
+def attachment_forces(robot: CableRobot, geometry: CableGeometry, H: ArrayLike) -> Array:
+    """Return theta_B (k, 3) [N]: the force applied to each cable at B in the simplified model.
+
+    Args:
+        robot: the robot.
+        geometry: the chords at a pose.
+        H: (k,) [N] horizontal tensions.
+    """
+    chord = np.asarray(H, float) * geometry.L / geometry.Bx
+    half_weight = 0.5 * robot.weight_per_metre * geometry.L
+    return chord[:, None] * geometry.u + half_weight[:, None] * geometry.z
+
+
+def D_tau(robot: CableRobot, geometry: CableGeometry, H: ArrayLike) -> Array:
+    """Return (k, 6, 6): change of each cable's wrench [torque; force] with the twist, H held.
+
+    Args:
+        robot: the robot.
+        geometry: the chords at a pose.
+        H: (k,) [N] horizontal tensions.
+    """
+    H = np.asarray(H, float)
+    Bx, Bz, L = geometry.Bx, geometry.Bz, geometry.L
+    slope = np.stack([-Bz, np.zeros_like(Bx), Bx], -1)
+    D_f = (H * Bz / (L * Bx**2))[:, None, None] * geometry.u[:, :, None] * slope[:, None, :]
+    velocity = D_Bf(geometry)
+    D_u1 = D_f @ D_B(geometry) + (H * L / Bx)[:, None, None] * D_u(geometry)
+    stretch = np.einsum("ki,kij->kj", geometry.u, velocity)
+    D_urho = 0.5 * robot.weight_per_metre * geometry.z[None, :, None] * stretch[:, None, :]
+    force = D_urho + D_u1
+    D_EB = velocity.copy()
+    D_EB[:, :, 3:] = 0.0
+    torque = -skew(attachment_forces(robot, geometry, H)) @ D_EB + skew(geometry.EB) @ force
+    return np.concatenate([torque, force], axis=1)
+
+
+def D_ext(robot: CableRobot, geometry: CableGeometry) -> Array:
+    """Return (6, 6): change of the weight's wrench [torque; force] with the twist [omega; v].
+
+    Zero when the centre of mass is at the platform's origin, as the paper assumes.
+
+    Args:
+        robot: the robot.
+        geometry: the chords at the pose.
+    """
+    EG = geometry.R_FP @ robot.center_of_mass
+    D = np.zeros((6, 6))
+    D[:3, :3] = skew(-robot.mass * robot.gravity * geometry.z) @ skew(EG)
+    return D
+
+
+def D_s(
+    robot: CableRobot, pose: RigidTransform | ArrayLike, H: ArrayLike, R_FW: ArrayLike | None = None
+) -> Array:
+    """Return (k, 6): rate of the horizontal tensions for a twist [omega; v] (eq. 12, A.2).
+
+    The minimum-norm rates among those that keep the platform balanced.
+
+    Args:
+        robot: the robot.
+        pose: X_WP, or [roll, pitch, yaw, x, y, z] (rad, m).
+        H: (k,) [N] horizontal tensions.
+        R_FW: (3, 3) rotation to the frame F of the twist; W itself if None.
+
+    Raises:
+        GeometryError: the wrench matrix has rank below 6.
+    """
+    X_WP = as_pose(pose)
+    geometry = cable_geometry(robot, X_WP, R_FW)
+    matrix = D_theta(geometry)
+    check_rank(matrix)
+    change = D_tau(robot, geometry, H).sum(0) - D_ext(robot, geometry)
+    return -np.linalg.lstsq(matrix, change, rcond=None)[0]
+
+
+def minimum_norm_horizontal_tensions(robot: CableRobot, pose: RigidTransform | ArrayLike) -> Array:
+    """Return H (k,) [N]: the horizontal tensions of least norm that balance the weight (A.2).
+
+    Args:
+        robot: the robot; its nominal mass is the weight.
+        pose: X_WP, or [roll, pitch, yaw, x, y, z] (rad, m).
+
+    Raises:
+        GeometryError: the wrench matrix has rank below 6.
+        TensionError: some cable would have to push.
+    """
+    X_WP = as_pose(pose)
+    geometry = cable_geometry(robot, X_WP)
+    matrix = D_theta(geometry)
+    check_rank(matrix)
+    H = np.asarray(np.linalg.lstsq(matrix, weight_wrench(robot, geometry), rcond=None)[0], float)
+    worst = int(np.argmin(H))
+    if H[worst] <= 0.0:
+        raise TensionError(
+            f"minimum-norm tensions at {_describe(X_WP)} would need cable {worst + 1} to push "
+            f"(horizontal tension {H[worst]:.1f} N): it is outside the wrench-feasible workspace"
+        )
+    return H
+
+
+def bounded_distribution(
+    matrix: ArrayLike, wrench: ArrayLike, lower: ArrayLike, upper: ArrayLike, preferred: ArrayLike
+) -> Array:
+    """Return t (k,), the closest to `preferred` with matrix t = wrench and lower <= t <= upper.
+
+    Solved exactly, as a least-distance problem in the null space of the wrench matrix (Lawson and
+    Hanson, Solving Least Squares Problems, chapter 23).
+
+    Args:
+        matrix: (6, k) wrench matrix.
+        wrench: (6,) wrench to balance.
+        lower: (k,) or scalar lower bounds [N].
+        upper: (k,) or scalar upper bounds [N].
+        preferred: (k,) or scalar tensions to stay close to [N].
+
+    Raises:
+        TensionError: no tensions within the bounds balance the wrench.
+    """
+    from scipy.optimize import nnls
+
+    A = np.asarray(matrix, float)
+    k = A.shape[1]
+    lower, upper, preferred = (
+        np.broadcast_to(np.asarray(x, float), (k,)) for x in (lower, upper, preferred)
+    )
+    particular = np.linalg.lstsq(A, np.asarray(wrench, float), rcond=None)[0]
+    _, singular, Vt = np.linalg.svd(A)
+    null = Vt[int(np.sum(singular > RANK_TOLERANCE * singular[0])) :].T
+    centre = particular + null @ (null.T @ (preferred - particular))
+    if null.shape[1] == 0:
+        if np.any(centre < lower) or np.any(centre > upper):
+            raise TensionError("the only tensions that balance the wrench leave their limits")
+        return centre
+    scale = float(np.max(upper - lower))
+    G = np.vstack([null, -null])
+    h = np.concatenate([lower - centre, centre - upper]) / scale
+    # Least distance: min |y| with G y >= h, from the nonnegative least squares of [G h]^T u = e.
+    E = np.vstack([G.T, h])
+    f = np.zeros(E.shape[0])
+    f[-1] = 1.0
+    u, residual_norm = nnls(E, f)
+    residual = E @ u - f
+    if residual_norm < 1e-10:
+        worst = int(np.argmax(np.maximum(lower - centre, centre - upper)))
+        raise TensionError(
+            f"no tensions between {lower.min():g} and {upper.max():g} N balance the wrench; "
+            f"cable {worst + 1} is the furthest out ({centre[worst]:.1f} N)"
+        )
+    return np.clip(centre + null @ (-residual[:-1] / residual[-1]) * scale, lower, upper)
+
+
+def tension_distribution(
+    robot: CableRobot, pose: RigidTransform | ArrayLike, rule: str = "minimum norm"
+) -> Array:
+    """Return chord tensions T (k,) [N] that balance the weight at a pose in the simplified model.
+
+    Args:
+        robot: the robot.
+        pose: X_WP, or [roll, pitch, yaw, x, y, z] (rad, m).
+        rule: "minimum norm", or "within limits": inside the robot's tension limits and closest to
+            their middle.
+
+    Raises:
+        GeometryError: the wrench matrix has rank below 6.
+        TensionError: no such tensions.
+    """
+    X_WP = as_pose(pose)
+    geometry = cable_geometry(robot, X_WP)
+    matrix = wrench_matrix(geometry)
+    check_rank(matrix)
+    return distribute(robot, matrix, weight_wrench(robot, geometry), rule, X_WP)
+
+
+def distribute(
+    robot: CableRobot, matrix: Array, wrench: Array, rule: str, X_WP: RigidTransform
+) -> Array:
+    """Return tensions (k,) [N] with matrix t = wrench, by a rule of `tension_distribution`.
+
+    Args:
+        robot: the robot, for its limits.
+        matrix: (6, k) wrench per unit of tension.
+        wrench: (6,) to balance.
+        rule: "minimum norm" or "within limits".
+        X_WP: the pose, for the message of an error.
+
+    Raises:
+        TensionError: no such tensions.
+        ValueError: an unknown rule.
+    """
+    if rule == "minimum norm":
+        tensions = np.asarray(np.linalg.lstsq(matrix, wrench, rcond=None)[0], float)
+        worst = int(np.argmin(tensions))
+        if tensions[worst] <= 0.0:
+            raise TensionError(
+                f"minimum-norm tensions at {_describe(X_WP)} would need cable {worst + 1} to push "
+                f"({tensions[worst]:.1f} N): the pose is outside the wrench-feasible workspace"
+            )
+        return tensions
+    if rule != "within limits":
+        raise ValueError(f'unknown rule "{rule}"; known are "minimum norm" and "within limits"')
+    low, high = robot.cable.min_tension, robot.cable.max_tension
+    try:
+        return bounded_distribution(matrix, wrench, low, high, 0.5 * (low + high))
+    except TensionError as error:
+        raise TensionError(f"at {_describe(X_WP)}: {error}") from None
+
+
+def _describe(X_WP: RigidTransform) -> str:
+    x, y, z = X_WP.translation()
+    roll, pitch, yaw = np.degrees(as_pose(X_WP).rotation().ToRollPitchYaw().vector())
+    return (
+        f"(x, y, z) = ({x:.2f}, {y:.2f}, {z:.2f}) m, rpy = ({roll:.1f}, {pitch:.1f}, {yaw:.1f}) deg"
+    )

@@ -1,0 +1,82 @@
+"""Winch dynamics: the PID of Fig. 9 on a motor that carries its cable's tension."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.rotations import Array
+
+STEP = 1e-40
+
+
+class WinchModel:
+    """Angle, rate and error integral of k winches: J d2q/dt2 = tau + r T_W - b dq/dt - friction.
+
+    tau = Kp (q_d - q) + Ki integral - Kd dq/dt (Fig. 9), limited, the integral held while it would
+    push the torque further out. q > 0 pays out. T_W = T_A exp(-mu theta tanh(dl/dt / v_l)): an
+    eyelet's friction raises the winch's share when it reels in (capstan equation). Friction terms
+    are stiff when their speeds are small.
+
+    Args:
+        robot: the robot, for its winch.
+    """
+
+    def __init__(self, robot: CableRobot) -> None:
+        from cdpr_drake.model.kernels import winch as kernel
+
+        w = robot.winch
+        self._evaluate = kernel.winch_derivatives
+        self.num_cables = robot.num_cables
+        self.parameters = np.array(
+            [
+                w.inertia,
+                w.damping,
+                w.proportional_gain,
+                w.integral_gain,
+                w.derivative_gain,
+                w.torque_limit,
+                w.transmission,
+                w.coulomb_torque,
+                w.coulomb_rate,
+                w.capstan_exponent,
+                w.capstan_speed,
+            ],
+            float,
+        )
+
+    def __call__(self, state: Array, desired: Array, T_A: Array) -> tuple[Array, Array, Array]:
+        """Return the state's derivative (3 k,), motor torques (k,) [N m] and tensions T_W (k,) [N].
+
+        Args:
+            state: (3 k,) [angle (rad); rate (rad/s); integral of the angle error (rad s)].
+            desired: (k,) desired motor angles [rad].
+            T_A: (k,) tensions at the drawing points [N].
+        """
+        k = self.num_cables
+        out = np.zeros(3 * k, state.dtype), np.zeros(k, state.dtype), np.zeros(k, state.dtype)
+        self._evaluate(state, desired, T_A, self.parameters, *out)
+        return out
+
+    def with_jacobian(self, state: Array, desired: Array, T_A: Array) -> tuple[Array, Array]:
+        """Return [derivative (3 k); torque (k); T_W (k)] and its Jacobian (5 k, 5 k).
+
+        Args:
+            state: (3 k,) as above.
+            desired: (k,) desired motor angles [rad].
+            T_A: (k,) tensions at the drawing points [N].
+        """
+        k = self.num_cables
+        z = np.concatenate([state, desired, T_A])
+        jacobian = np.zeros((5 * k, 5 * k))
+        cables = np.arange(k)
+        for block in range(5):
+            # No winch touches another: one complex step moves the same quantity of all of them.
+            stepped = z.astype(complex)
+            stepped[block * k : (block + 1) * k] += 1j * STEP
+            y = np.concatenate(self(stepped[: 3 * k], stepped[3 * k : 4 * k], stepped[4 * k :]))
+            for row in range(5):
+                jacobian[row * k + cables, block * k + cables] = (
+                    y[row * k : (row + 1) * k].imag / STEP
+                )
+        return np.concatenate(self(state, desired, T_A)), jacobian

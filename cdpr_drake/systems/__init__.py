@@ -1,0 +1,48 @@
+"""The pieces of the robot and its control: each a Drake LeafSystem, for float and AutoDiffXd."""
+
+from cdpr_drake.systems.cable_force import CatenaryCableForce, CatenaryCableForce_
+from cdpr_drake.systems.camera import (
+    CableTangentCameras,
+    CableTangentCameras_,
+    CameraMeasurement,
+    CameraMeasurement_,
+)
+from cdpr_drake.systems.joint_space import (
+    ExponentialApproach,
+    ExponentialApproach_,
+    InverseKinematicsAngles,
+    InverseKinematicsAngles_,
+)
+from cdpr_drake.systems.load_cell import LoadCellFilter, LoadCellFilter_
+from cdpr_drake.systems.servo import (
+    MotorAngleIntegrator,
+    MotorAngleIntegrator_,
+    PoseError,
+    PoseError_,
+    PositionBasedVisualServo,
+    PositionBasedVisualServo_,
+)
+from cdpr_drake.systems.winch import WinchDynamics, WinchDynamics_
+
+__all__ = [
+    "CableTangentCameras",
+    "CableTangentCameras_",
+    "CameraMeasurement",
+    "CameraMeasurement_",
+    "CatenaryCableForce",
+    "CatenaryCableForce_",
+    "ExponentialApproach",
+    "ExponentialApproach_",
+    "InverseKinematicsAngles",
+    "InverseKinematicsAngles_",
+    "LoadCellFilter",
+    "LoadCellFilter_",
+    "MotorAngleIntegrator",
+    "MotorAngleIntegrator_",
+    "PoseError",
+    "PoseError_",
+    "PositionBasedVisualServo",
+    "PositionBasedVisualServo_",
+    "WinchDynamics",
+    "WinchDynamics_",
+]

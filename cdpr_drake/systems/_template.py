@@ -1,0 +1,71 @@
+"""What every system here shares: scalar conversion, and the chain rule for AutoDiffXd."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue, InitializeAutoDiff
+from pydrake.systems.scalar_conversion import TemplateSystem
+
+GAUSSIAN_INPUT = "noise"
+
+
+def system_template(name: str) -> Callable[[Callable[[type], type]], Any]:
+    """Define a system for float and AutoDiffXd: the decorated function maps a scalar to its class.
+
+    The class implements `_construct(self, ..., *, converter=None)` and `_construct_copy`; its
+    constructor's signature, as users see it, is that of `_construct`.
+
+    Args:
+        name: the system's name, without underscore.
+    """
+
+    def decorate(instantiate: Callable[[type], type]) -> Any:
+        def build(T: type) -> type:
+            cls = instantiate(T)
+            cls.__name__ = cls.__qualname__ = name if T is float else f"{name}_[AutoDiffXd]"
+            parameters = list(inspect.signature(cls._construct).parameters.values())  # type: ignore[attr-defined]
+            kept = [p for p in parameters if p.name not in ("self", "converter")]
+            cls.__signature__ = inspect.Signature(kept)  # type: ignore[attr-defined]
+            return cls
+
+        build.__module__ = instantiate.__module__
+        return TemplateSystem.define(f"{name}_", T_list=(float, AutoDiffXd))(build)
+
+    return decorate
+
+
+def value(array: np.ndarray) -> np.ndarray:
+    """Return the plain numbers of an array of float or AutoDiffXd."""
+    return ExtractValue(array).ravel() if array.dtype == object else array
+
+
+def chain(y: np.ndarray, jacobians: list[np.ndarray], *args: np.ndarray) -> np.ndarray:
+    """Return y as AutoDiffXd, its gradient the sum over `args` of Jacobian times gradient.
+
+    Args:
+        y: (m,) value.
+        jacobians: one (m, n_i) array per argument.
+        args: (n_i,) arrays of float or AutoDiffXd.
+    """
+    gradients = [ExtractGradient(a) if a.dtype == object else None for a in args]
+    width = max((g.shape[1] for g in gradients if g is not None), default=0)
+    total = np.zeros((y.size, width))
+    for jacobian, gradient in zip(jacobians, gradients, strict=True):
+        if gradient is not None and gradient.shape[1]:
+            total += jacobian @ gradient
+    return InitializeAutoDiff(y, total).ravel()
+
+
+def optional_input(port: Any, context: Any, size: int) -> np.ndarray:
+    """Return the value of an input port that may stay open: zeros if it does.
+
+    Args:
+        port: the input port.
+        context: the system's context.
+        size: the port's size.
+    """
+    return port.Eval(context) if port.HasValue(context) else np.zeros(size)
