@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from pydrake.common.value import Value
+from pydrake.common.value import AbstractValue
 from pydrake.systems.framework import LeafSystem_, ValueProducer
 
 from cdpr_drake.errors import CableError
@@ -66,7 +66,7 @@ def CatenaryCableForce_(T: type) -> type:
             }
             self._cache = self.DeclareCacheEntry(
                 "cables",
-                ValueProducer(allocate=lambda: Value[object](None), calc=self._solve),
+                ValueProducer(allocate=lambda: AbstractValue.Make(()), calc=self._solve),
                 inputs,
             )
             solved = self._cache.ticket()
