@@ -6,11 +6,12 @@ import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RotationalInertia, RpyFloatingJoint, SpatialInertia, UnitInertia
-from pydrake.systems.framework import Diagram, DiagramBuilder
-from pydrake.systems.primitives import Demultiplexer
+from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
+from pydrake.systems.primitives import Adder, AffineSystem, Demultiplexer
 
+from cdpr_drake.model.cables import packed_sizes
 from cdpr_drake.model.robot import CableRobot
-from cdpr_drake.systems import CatenaryCableForce, WinchDynamics
+from cdpr_drake.systems import CatenaryCableForce, WinchDynamics, ZeroWhenOpen
 
 ROBOT_OUTPUTS = (
     "pose",
@@ -76,50 +77,76 @@ def make_cable_robot(robot: CableRobot) -> Diagram:
         - motor_rates
         - motor_torques
 
-    Blocks: "platform", "cables", "winches". pose (6) is [roll, pitch, yaw, x, y, z] (rad, m) of
-    X_WP; external_wrench (6) is [torque; force] at the platform's origin in W.
+    Blocks: "platform", "cables", "winches", and "transmission" from motor angles to lengths; the
+    rest splits and adds signals. pose (6) is [roll, pitch, yaw, x, y, z] (rad, m) of X_WP; external_wrench (6) is [torque; force] at the platform's origin in W.
 
     Args:
         robot: the robot; any number of cables.
     """
     builder = DiagramBuilder()
+    k = robot.num_cables
     plant = builder.AddNamedSystem("platform", make_platform(robot))
     cables = builder.AddNamedSystem("cables", CatenaryCableForce(robot))
     winches = builder.AddNamedSystem("winches", WinchDynamics(robot))
-    split = builder.AddNamedSystem("pose_and_twist", Demultiplexer([6, 6]))
-
-    def connect(source: str, system: object, target: str) -> None:
-        builder.Connect(winches.GetOutputPort(source), system.GetInputPort(target))  # type: ignore[attr-defined]
+    external = builder.AddNamedSystem("external_wrench", ZeroWhenOpen(6))
+    total = builder.AddNamedSystem("total_wrench", Adder(2, 6))
 
     state = plant.get_state_output_port()
+    pose, _ = _split(builder, "platform_pose", state, [6, 6])
+    motion = builder.AddNamedSystem("transmission", _transmission(robot))
+    builder.Connect(winches.GetOutputPort("state"), motion.get_input_port())
+    length, length_rate = _split(builder, "length_and_rate", motion.get_output_port(), [k, k])
+    angle, rate, _ = _split(builder, "motor_state", winches.GetOutputPort("state"), [k, k, k])
     builder.Connect(state, cables.GetInputPort("platform_state"))
-    builder.Connect(state, split.get_input_port())
-    connect("unstrained_length", cables, "unstrained_length")
-    connect("unstrained_length_rate", cables, "unstrained_length_rate")
-    builder.Connect(
-        cables.GetOutputPort("platform_wrench"), plant.get_applied_generalized_force_input_port()
-    )
-    builder.Connect(
-        cables.GetOutputPort("tension_at_drawing_point"),
-        winches.GetInputPort("tension_at_drawing_point"),
-    )
+    builder.Connect(length, cables.GetInputPort("unstrained_length"))
+    builder.Connect(length_rate, cables.GetInputPort("unstrained_length_rate"))
+    sizes = packed_sizes(k)
+    parts = _split(builder, "cable_outputs", cables.GetOutputPort("packed"), list(sizes.values()))
+    outputs = dict(zip(sizes, parts, strict=True))
+    tension = outputs["tension_at_drawing_point"]
+    builder.Connect(tension, winches.GetInputPort("tension_at_drawing_point"))
+    builder.Connect(outputs.pop("platform_wrench"), total.get_input_port(0))
+    builder.Connect(external.get_output_port(), total.get_input_port(1))
+    builder.Connect(total.get_output_port(), plant.get_applied_generalized_force_input_port())
     builder.ExportInput(winches.GetInputPort("desired_motor_angle"), "desired_motor_angles")
-    builder.ExportInput(cables.GetInputPort("external_wrench"), "external_wrench")
+    builder.ExportInput(external.get_input_port(), "external_wrench")
 
-    ports = {
-        "pose": split.get_output_port(0),
+    outputs |= {
+        "pose": pose,
         "platform_state": state,
-        "tension_at_winch": winches.GetOutputPort("tension_at_winch"),
-        "unstrained_length": winches.GetOutputPort("unstrained_length"),
-        "motor_angles": winches.GetOutputPort("motor_angle"),
-        "motor_rates": winches.GetOutputPort("motor_rate"),
+        # Without capstan friction the winch carries what the drawing point does.
+        "tension_at_winch": winches.GetOutputPort("tension_at_winch")
+        if robot.winch.capstan_exponent > 0.0
+        else tension,
+        "unstrained_length": length,
+        "motor_angles": angle,
+        "motor_rates": rate,
         "motor_torques": winches.GetOutputPort("motor_torque"),
     }
     for name in ROBOT_OUTPUTS:
-        builder.ExportOutput(ports[name] if name in ports else cables.GetOutputPort(name), name)
+        builder.ExportOutput(outputs[name], name)
     diagram = builder.Build()
     diagram.set_name("cable_robot")
     return diagram
+
+
+def _split(
+    builder: DiagramBuilder, name: str, port: OutputPort, sizes: list[int]
+) -> list[OutputPort]:
+    block = builder.AddNamedSystem(name, Demultiplexer(sizes))
+    builder.Connect(port, block.get_input_port())
+    return [block.get_output_port(i) for i in range(len(sizes))]
+
+
+def _transmission(robot: CableRobot) -> AffineSystem:
+    """Return [l; dl/dt] = [l(0) + r q; r dq/dt] of the winches' state [q; dq/dt; integral]."""
+    k, winch = robot.num_cables, robot.winch
+    D = np.hstack([winch.transmission * np.eye(2 * k), np.zeros((2 * k, k))])
+    y0 = np.concatenate([winch.encoder_zero_length, np.zeros(k)])
+    none = np.zeros((0, 0))
+    return AffineSystem(
+        A=none, B=np.zeros((0, 3 * k)), f0=np.zeros(0), C=np.zeros((2 * k, 0)), D=D, y0=y0
+    )
 
 
 def platform_pose(diagram: Diagram, context: object) -> RigidTransform:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
-from pydrake.systems.framework import Context, Diagram, EventStatus
+from pydrake.systems.framework import Context, Diagram
 
 from cdpr_drake.diagrams.rest import robot_of
-from cdpr_drake.diagrams.watch import LimitWatch
+from cdpr_drake.diagrams.watch import WATCH_PERIOD, LimitWatch
 
 MAX_STEP = 0.01
 """Default step of the fixed-step Runge-Kutta 3 integrator [s]: six to a period of the winches."""
@@ -107,16 +108,19 @@ def simulate(
         context: where it starts; it is moved on to the end.
         until: [s].
         record: names of output ports; those of `RECORDED` that the diagram has if None.
-        every: period of the record [s]; it does not bound the step.
+        every: period of the record [s].
         max_step: step of the integrator [s].
         accuracy: for error control; fixed steps if None.
         progress: called with the time at each record.
 
     Raises:
+        ValueError: an end or period that is none.
         CableError: a cable broke or has no equilibrium.
         SimulationError: the platform left the hull of the drawing points, its pitch came within 5
             degrees of 90, or a value is not finite.
     """
+    if not (math.isfinite(until) and math.isfinite(every) and every > 0.0):
+        raise ValueError(f"a run needs a finite end and a positive period, got {until}, {every} s")
     names = RECORDED if record is None else record
     ports = {n: diagram.GetOutputPort(n) for n in names if diagram.HasOutputPort(n)}
     times: list[float] = []
@@ -124,26 +128,19 @@ def simulate(
     watch = LimitWatch(robot_of(diagram))
     pose = diagram.GetOutputPort("pose")
     tension = diagram.GetOutputPort("tension_at_drawing_point")
-    start = context.get_time()
-
-    def monitor(now: Context) -> EventStatus:
-        t = now.get_time()
-        if watch.is_due(t):
-            watch.check_pose(t, pose.Eval(now))
-        if t >= start + len(times) * every - 1e-9:
-            watch.check_tensions(t, tension.Eval(now))
-            times.append(t)
-            for name, port in ports.items():
-                values[name].append(port.Eval(now))
-            if progress is not None:
-                progress(t)
-        return EventStatus.Succeeded()
-
     simulator = make_simulator(diagram, context, max_step=max_step, accuracy=accuracy)
-    simulator.set_monitor(monitor)
     begun = time.perf_counter()
     simulator.Initialize()
-    simulator.AdvanceTo(until)
+    for t, is_record in _stops(context.get_time(), until, every):
+        simulator.AdvanceTo(t)
+        watch.check_pose(t, pose.Eval(context))
+        if is_record:
+            watch.check_tensions(t, tension.Eval(context))
+            times.append(t)
+            for name, port in ports.items():
+                values[name].append(port.Eval(context))
+            if progress is not None:
+                progress(t)
     return Record(
         time=np.array(times),
         signals={name: np.array(v) for name, v in values.items()},
@@ -151,3 +148,16 @@ def simulate(
         wall_time=time.perf_counter() - begun,
         slack_cables=watch.slack,
     )
+
+
+def _stops(start: float, until: float, every: float) -> Iterator[tuple[float, bool]]:
+    """Yield (time, whether to record there): every period, the end, and the watch's looks between.
+
+    Times come from counting, not adding, so that they meet the samples of a loop exactly.
+    """
+    looks = max(1, math.ceil(every / WATCH_PERIOD - 1e-9))
+    count = max(0, math.floor((until - start) / every + 1e-9))
+    for n in range(count * looks + 1):
+        yield start + n * every / looks, n % looks == 0
+    if until > start + count * every + 1e-9:
+        yield until, True

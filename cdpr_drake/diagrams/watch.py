@@ -11,7 +11,7 @@ from cdpr_drake.model.robot import CableRobot
 
 PITCH_MARGIN = math.radians(5.0)
 
-PERIOD = 0.05
+WATCH_PERIOD = 0.05
 """Time between two looks at the pose [s]; the cables' own state is checked at every evaluation."""
 
 
@@ -26,7 +26,6 @@ class LimitWatch:
         from scipy.spatial import ConvexHull, QhullError
 
         self.slack: dict[int, float] = {}
-        self._next_look = -math.inf
         points = robot.drawing_points
         self._normals, self._offsets = np.zeros((0, 2)), np.zeros(0)
         self._top = float(points[:, 2].max())
@@ -37,13 +36,6 @@ class LimitWatch:
             # Fewer than three drawing points, or all on a line: no area to stay within.
             self._top = math.inf
         self._slack_tension = robot.weight_per_metre * float(np.ptp(points, axis=0).max()) / 20.0
-
-    def is_due(self, time: float) -> bool:
-        """Whether the pose is to be checked at a `time` [s]; the next look is a period later."""
-        if time < self._next_look - 1e-9:
-            return False
-        self._next_look = time + PERIOD
-        return True
 
     def check_pose(self, time: float, pose: np.ndarray) -> None:
         """Raise SimulationError where a `pose` (6,) at a `time` [s] leaves what the model covers.

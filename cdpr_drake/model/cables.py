@@ -11,6 +11,22 @@ WIDTH = 14
 """Columns of a cable's outputs, as in `kernels.catenary.cable_forces`."""
 
 
+def packed_sizes(num_cables: int) -> dict[str, int]:
+    """Return names and sizes of the parts of `CableSet`'s packed result, in order.
+
+    Args:
+        num_cables: k.
+    """
+    return {
+        "platform_wrench": 6,
+        "tension_at_drawing_point": num_cables,
+        "tension_at_attachment_point": num_cables,
+        "tangents_at_drawing_point": 3 * num_cables,
+        "tangents_at_attachment_point": 3 * num_cables,
+        "dbeta": num_cables,
+    }
+
+
 class CableSet:
     """All k cables of a robot between their winches and the platform.
 
@@ -24,6 +40,7 @@ class CableSet:
         self._catenary, self._platform = catenary, platform
         self.robot = robot
         self.num_cables = robot.num_cables
+        self._size = sum(packed_sizes(robot.num_cables).values())
         cable = robot.cable
         self._points = (
             np.ascontiguousarray(robot.drawing_points, float),
@@ -37,30 +54,27 @@ class CableSet:
         )
         self._breaking_load = float(cable.breaking_load)
 
-    def __call__(self, state: Array, length: Array, rate: Array) -> tuple[Array, Array, int]:
-        """Return the wrench [torque; force] (6,) on the platform, the outputs (k, 14) and a status.
+    def __call__(self, state: Array, length: Array, rate: Array) -> tuple[Array, int]:
+        """Return the packed result (6 + 9 k,), its parts as in `packed_sizes`, and a status.
 
-        The wrench is at the platform's origin in W; status 0, or the number of the cable whose
-        catenary was not found, or minus the number of one at its breaking load.
+        The wrench [torque; force] is at the platform's origin in W; status 0, or the number of the
+        cable whose catenary was not found, or minus the number of one at its breaking load.
 
         Args:
             state: (12,) [roll, pitch, yaw, x, y, z, omega, v] of the platform in W.
             length: (k,) total unstrained lengths [m].
             rate: (k,) their rates [m/s].
         """
-        wrench, out = np.empty(6), np.empty((self.num_cables, WIDTH))
+        packed, out = np.empty(self._size), np.empty((self.num_cables, WIDTH))
         status = self._platform.platform_cable_forces(
-            state, length, rate, *self._points, *self._cable, self._breaking_load, wrench, out
+            state, length, rate, *self._points, *self._cable, self._breaking_load, packed, out
         )
-        return wrench, out, status
+        return packed, status
 
-    def with_jacobian(
-        self, state: Array, length: Array, rate: Array
-    ) -> tuple[Array, Array, int, Array, Array]:
-        """Return what a call returns, and the Jacobians of wrench and outputs.
+    def with_jacobian(self, state: Array, length: Array, rate: Array) -> tuple[Array, int, Array]:
+        """Return the packed result, the status, and the Jacobian (6 + 9 k, 12 + 2 k).
 
-        Both are with respect to [state (12); length (k); rate (k)]: (6, 12 + 2 k) and
-        (k, 14, 12 + 2 k).
+        The Jacobian is with respect to [state (12); length (k); rate (k)].
 
         Args:
             state: (12,) as above.
@@ -68,15 +82,14 @@ class CableSet:
             rate: (k,) their rates [m/s].
         """
         k = self.num_cables
+        packed, status = self(state, length, rate)
         drawing, attachment = self._points
         p_WB, v_WB = np.empty((k, 3)), np.empty((k, 3))
         self._platform.attachment_motion(state, attachment, p_WB, v_WB)
         out, local = np.empty((k, WIDTH)), np.zeros((k, WIDTH, 8))
-        status = self._catenary.cable_forces_jacobian(
+        self._catenary.cable_forces_jacobian(
             drawing, p_WB, v_WB, length, rate, *self._cable, out, local
         )
-        if status == 0 and out[:, 3:5].max() >= self._breaking_load:
-            status = -1 - int(out[:, 3:5].max(axis=1).argmax())
         EB = p_WB - state[3:6]
         points = _point_jacobian(state, EB)
         jacobian = np.zeros((k, WIDTH, 12 + 2 * k))
@@ -84,15 +97,13 @@ class CableSet:
         cables = np.arange(k)
         jacobian[cables, :, 12 + cables] = local[:, :, 6]
         jacobian[cables, :, 12 + k + cables] = local[:, :, 7]
-        force = out[:, :3]
-        wrench = np.concatenate([np.cross(EB, force).sum(0), force.sum(0)])
-        d_wrench = np.concatenate(
-            [(skew(EB) @ jacobian[:, :3]).sum(0), jacobian[:, :3].sum(0)], axis=0
-        )
+        torque = (skew(EB) @ jacobian[:, :3]).sum(0)
         arm = points[:, :3].copy()
         arm[:, :, 3:6] = 0.0
-        d_wrench[:3, :12] -= (skew(force) @ arm).sum(0)
-        return wrench, out, status, d_wrench, jacobian
+        torque[:, :12] -= (skew(out[:, :3]) @ arm).sum(0)
+        parts = [torque, jacobian[:, :3].sum(0), jacobian[:, 3], jacobian[:, 4]]
+        parts += [jacobian[:, 5:8].reshape(3 * k, -1), jacobian[:, 8:11].reshape(3 * k, -1)]
+        return packed, status, np.vstack([*parts, jacobian[:, 11]])
 
 
 def _point_jacobian(state: Array, EB: Array) -> Array:

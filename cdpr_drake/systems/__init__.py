@@ -23,6 +23,7 @@ from cdpr_drake.systems.servo import (
     PositionBasedVisualServo_,
 )
 from cdpr_drake.systems.winch import WinchDynamics, WinchDynamics_
+from cdpr_drake.systems.zero_when_open import ZeroWhenOpen, ZeroWhenOpen_
 
 __all__ = [
     "CableTangentCameras",
@@ -45,4 +46,6 @@ __all__ = [
     "PositionBasedVisualServo_",
     "WinchDynamics",
     "WinchDynamics_",
+    "ZeroWhenOpen",
+    "ZeroWhenOpen_",
 ]

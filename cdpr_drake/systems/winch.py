@@ -30,14 +30,16 @@ def WinchDynamics_(T: type) -> type:
             - motor_rate
             - motor_torque
             - tension_at_winch
+            - state
 
         J d2q/dt2 = tau + r T_W - b dq/dt - tau_c tanh(dq/dt / v_s), with tau = Kp (q_d - q) + Ki
         integral(q_d - q) - Kd dq/dt within the torque limit, the integral held while it would push
         the torque further out; l = l(0) + r q, q > 0 pays out; T_W = T_A exp(-mu theta tanh(dl/dt /
         v_l)). Friction and capstan are off by default; both are stiff when their speeds are small.
 
-        All ports have size k: angles in rad, unstrained length in m with the run from drum to
-        eyelet, torque in N m, tensions in N. State: [angle (k); rate (k); integral (k)].
+        All ports but state have size k: angles in rad, unstrained length in m with the run from
+        drum to eyelet, torque in N m, tensions in N. State, and the port of that name (3 k):
+        [angle (k); rate (k); integral (k)].
 
         Args:
             robot: the robot, for its winch.
@@ -51,23 +53,24 @@ def WinchDynamics_(T: type) -> type:
             self._zero_length = robot.winch.encoder_zero_length
             self._capstan = robot.winch.capstan_exponent > 0.0
             k = self._k = robot.num_cables
-            self.DeclareContinuousState(k, k, k)
+            state = self.DeclareContinuousState(k, k, k)
             self._desired_port = self.DeclareVectorInputPort("desired_motor_angle", k)
             self._tension_port = self.DeclareVectorInputPort("tension_at_drawing_point", k)
-            state = {self.xc_ticket()}
+            own = {self.xc_ticket()}
             for name, calc in (
                 ("unstrained_length", self._calc_length),
                 ("unstrained_length_rate", self._calc_length_rate),
                 ("motor_angle", self._calc_angle),
                 ("motor_rate", self._calc_rate),
             ):
-                self.DeclareVectorOutputPort(name, k, calc, state)
+                self.DeclareVectorOutputPort(name, k, calc, own)
             self.DeclareVectorOutputPort(
-                "motor_torque", k, self._calc_torque, state | {self._desired_port.ticket()}
+                "motor_torque", k, self._calc_torque, own | {self._desired_port.ticket()}
             )
             self.DeclareVectorOutputPort(
-                "tension_at_winch", k, self._calc_tension, state | {self._tension_port.ticket()}
+                "tension_at_winch", k, self._calc_tension, own | {self._tension_port.ticket()}
             )
+            self.DeclareStateOutputPort("state", state)
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
             Impl._construct(self, other.robot, converter=converter)

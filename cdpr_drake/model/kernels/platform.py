@@ -38,9 +38,9 @@ def attachment_motion(state, attachment, p_WB, v_WB):
 
 @jit
 def platform_cable_forces(
-    state, length, rate, drawing, attachment, w, stiffness, run, damping_time, limit, wrench, out
+    state, length, rate, drawing, attachment, w, stiffness, run, damping_time, limit, packed, out
 ):
-    """Write the cables' wrench [torque; force] at the platform's origin, and their outputs.
+    """Write the cables' wrench [torque; force] at the platform's origin and their outputs, packed.
 
     Arguments and columns of out (k, 14) as in `cable_forces`; returns its status, or minus the
     number of a cable whose tension is not below the limit.
@@ -51,16 +51,21 @@ def platform_cable_forces(
     attachment_motion(state, attachment, p_WB, v_WB)
     status = cable_forces(drawing, p_WB, v_WB, length, rate, w, stiffness, run, damping_time, out)
     for a in range(6):
-        wrench[a] = 0.0
+        packed[a] = 0.0
     for i in range(k):
         ex, ey, ez = p_WB[i, 0] - state[3], p_WB[i, 1] - state[4], p_WB[i, 2] - state[5]
         fx, fy, fz = out[i, 0], out[i, 1], out[i, 2]
-        wrench[0] += ey * fz - ez * fy
-        wrench[1] += ez * fx - ex * fz
-        wrench[2] += ex * fy - ey * fx
-        wrench[3] += fx
-        wrench[4] += fy
-        wrench[5] += fz
+        packed[0] += ey * fz - ez * fy
+        packed[1] += ez * fx - ex * fz
+        packed[2] += ex * fy - ey * fx
+        packed[3] += fx
+        packed[4] += fy
+        packed[5] += fz
+        packed[6 + i], packed[6 + k + i] = out[i, 3], out[i, 4]
+        for a in range(3):
+            packed[6 + 2 * k + 3 * i + a] = out[i, 5 + a]
+            packed[6 + 5 * k + 3 * i + a] = out[i, 8 + a]
+        packed[6 + 8 * k + i] = out[i, 11]
         if status == 0 and not max(out[i, 3], out[i, 4]) < limit:
             status = -i - 1
     return status
