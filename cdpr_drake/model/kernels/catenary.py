@@ -1,0 +1,730 @@
+"""The exact elastic catenary (Irvine) of each cable: forces, tensions, tangents and their Jacobian.
+
+A cable of total unstrained `length` runs from its drum to the drawing point A (geometric length
+`drum_run`, tension T_A, weight neglected) and hangs from A to the attachment point B (unstrained
+length l0). It obeys Hooke's law with the secant stiffness EA(T_A), one value per cable:
+
+    EA(T) = asymptote - softening / (T + offset)        l0 = length - drum_run / (1 + T_A / EA(T_A))
+    Bx = H l0/EA + (H/w) D          D = asinh(V_B/H) - asinh(V_A/H),   V_A = V_B - w l0
+    Bz = l0 (V_A + V_B) (1/(2 EA) + 1/(T_A + T_B))                     T = hypot(H, V)
+
+(Irvine, Cable Structures, 1981). (H, V) is the tension vector directed from A to B in the vertical
+plane of the cable, x horizontal from A to B, z up. Every sum below is written so that nothing
+cancels for a tight cable: with S = T_A + T_B, y = w l0/S and atanh y = y + y^3 b(y^2) the geometric
+part G of the flexibility d(Bx,Bz)/d(H,V_B) = (l0/EA) I + G has
+
+    trace G = D/w = (2 l0/S)(1 + y^2 b)      det G = H^2/(T_A T_B) (2 l0/S)^2 y^2 b / (1 - y^2)
+
+Arguments, float64 in SI units:
+    Bx, Bz: B seen from A [m]; Bx > 0 horizontal, Bz up.
+    l0: unstrained length of the span A-B [m].
+    H: horizontal tension [N], > 0.
+    w: weight per unstrained metre [N/m], >= 0.
+    EA: constant axial stiffness [N]. stiffness: (3,) [asymptote [N], softening [N2], offset [N]],
+        the law of EA(T), T [N]; softening = 0 for a constant EA.
+    p_WA, p_WB: (k, 3) drawing and attachment points [m], v_WB: (k, 3) velocity of the latter [m/s],
+        all in W.
+    length, length_rate: (k,) total unstrained length [m], run included, and its rate [m/s].
+    drum_run: (k,) geometric length of the run from the drum to A [m].
+    damping_time: [s], a rate of strain adds EA * damping_time times itself to the tension.
+    out: (k, 14), jacobian: (k, 14, 8), C-contiguous, written.
+
+A status is 0, or 1 + the index of the cable that failed: a number that is not finite or out of
+range, no span left beside the run (length <= drum_run), B at A.
+"""
+
+from __future__ import annotations
+
+import math
+
+from cdpr_drake.model.kernels import jit
+
+MAX_ITERATIONS = 40
+# Vertical cables: the plane of the cable is undefined at Bx = 0, so Bx is kept above this times L.
+MIN_SLOPE = 1e-6
+# An exactly vertical cable is taken to lean this little (times L) towards +x.
+MIN_LEAN = 1e-12
+MIN_WEIGHT = 1e-9  # [N/m]
+# Outside these the squares and products below would leave the range of float64.
+MIN_LENGTH, MAX_LENGTH = 1e-9, 1e9  # [m]
+MIN_STIFFNESS, MAX_STIFFNESS = 1e-3, 1e15  # [N]
+MAX_WEIGHT = 1e9  # [N/m]
+MAX_SPEED, MAX_DAMPING_TIME = 1e9, 1e9  # [m/s], [s]
+
+
+@jit
+def secant_stiffness(T, asymptote, softening, offset):
+    """Return (EA(T), dEA/dT)."""
+    if softening == 0.0:
+        return asymptote, 0.0
+    r = softening / (T + offset)
+    return asymptote - r, r / (T + offset)
+
+
+@jit
+def _series(t):
+    """b(t) = (atanh y - y)/y^3 with t = y^2 < 0.81."""
+    if t < 1e-4:
+        return 1 / 3 + t * (1 / 5 + t * (1 / 7 + t / 9))
+    if t < 1e-2:
+        tail = 1 / 9 + t * (1 / 11 + t * (1 / 13 + t * (1 / 15 + t / 17)))
+        return 1 / 3 + t * (1 / 5 + t * (1 / 7 + t * tail))
+    y = math.sqrt(t)
+    return (math.atanh(y) - y) / (t * y)
+
+
+@jit
+def _log_sum(V, T, H):
+    """asinh(V/H) + ln H without cancellation for V < 0."""
+    if V >= 0.0:
+        return math.log(V + T)
+    return 2.0 * math.log(H) - math.log(T - V)
+
+
+@jit
+def _span(H, V_B, l0, w):
+    """Return (T_A, T_B, X, Z, Gxx, Gxz, Gzz, det G): the inextensible part of the span and of its
+    flexibility. X, Z [m] are what the cable would span if it did not stretch.
+    """
+    V_A = V_B - w * l0
+    H2 = H * H
+    T_A = math.sqrt(H2 + V_A * V_A)
+    T_B = math.sqrt(H2 + V_B * V_B)
+    S = T_A + T_B
+    P = T_A * T_B
+    f = l0 / S
+    Z = f * (V_A + V_B)
+    y = w * f
+    Gxz = -H * Z / P
+    if y < 0.5:
+        t = y * y
+        tb = t * _series(t)
+        u = 1.0 / (1.0 - t)
+        trace = 2.0 * f * (1.0 + tb)
+        H2P = H2 / P
+        Gzz = 2.0 * f * u * H2P
+        # 1 - H^2/P, which is small for a nearly horizontal cable
+        rest = (H2 * (V_A * V_A + V_B * V_B) + V_A * V_A * V_B * V_B) / (P * (P + H2))
+        Gxx = 2.0 * f * (tb + u * (rest - t))
+        return T_A, T_B, H * trace, Z, Gxx, Gxz, Gzz, H2P * 4.0 * f * f * tb * u
+    D = _log_sum(V_B, T_B, H) - _log_sum(V_A, T_A, H)
+    if V_A * V_B > 0.0:
+        # H^2 sinh D and H^2 (cosh D - 1) of two ends of the same slope
+        sinh = H2 * abs(V_B * V_B - V_A * V_A) / (abs(V_B) * T_A + abs(V_A) * T_B)
+        C = P + V_A * V_B
+        cosh1 = H2 * (V_A * V_A + V_B * V_B + H2 - C) / C
+    else:
+        sinh = V_B * T_A - V_A * T_B
+        cosh1 = P - V_A * V_B - H2
+    slope = sinh / P
+    det = max(D * slope - 2.0 * cosh1 / P, 0.0) / (w * w)
+    return T_A, T_B, H * D / w, Z, (D - slope) / w, Gxz, slope / w, det
+
+
+@jit
+def _linearise(H, V_B, l0, length, run, w, asymptote, softening, offset):
+    """Linearise a cable about (H, V_B, l0): d(x,z) = A d(H,V_B) + m dr, where the closure of the
+    run asks for l0 + r. With k, mu: dl0 = mu dr + k (H dH + V_A dV_B).
+
+    Return (x, z, r, Kxx, Kxz, Kzx, Kzz, mx, mz, mu, k, T_A, T_B, EA, dEA) with K = A^-1 (symmetric
+    for constant EA).
+    """
+    T_A, T_B, X, Z, Gxx, Gxz, Gzz, det = _span(H, V_B, l0, w)
+    EA, dEA = secant_stiffness(T_A, asymptote, softening, offset)
+    V_A = V_B - w * l0
+    soft = 1.0 / EA
+    flat = 1.0 / T_A
+    e = l0 * soft
+    Vm = 0.5 * (V_A + V_B)
+    x = X + H * e
+    z = Z + Vm * e
+    det += e * (e + Gxx + Gzz)
+    Jxx = Gxx + e
+    Jzz = Gzz + e
+    g = soft + flat
+    gx = g * H
+    gz = g * V_A
+    if run == 0.0 and softening == 0.0:
+        i = 1.0 / det
+        Kxz = -Gxz * i
+        return (
+            x, z, length - l0, Jzz * i, Kxz, Kxz, Jxx * i,
+            gx, gz, 1.0, 0.0, T_A, T_B, EA, dEA,
+        )  # fmt: skip
+    # Unstrained length in the run, as it follows from T_A.
+    unstretch = 1.0 / (1.0 + T_A * soft)
+    part = run * unstretch
+    kappa = part * unstretch * (EA - T_A * dEA) * soft * soft
+    slope = w * V_A * flat
+    mu = 1.0 / (1.0 + kappa * slope)
+    k = kappa * mu * flat
+    # The stiffness follows T_A too: dT_A = mu ((H dH + V_A dV_B)/T_A - slope dr)
+    d = -e * dEA * soft * mu
+    bx = gx * k + d * H * flat
+    bz = gz * k + d * Vm * flat
+    mx = gx * mu - d * slope * H
+    mz = gz * mu - d * slope * Vm
+    i = 1.0 / (det + Jzz * bx * H - Gxz * (bz * H + bx * V_A) + Jxx * bz * V_A)
+    return (
+        x, z, length - part - l0,
+        (Jzz + bz * V_A) * i, -(Gxz + bx * V_A) * i, -(Gxz + bz * H) * i, (Jxx + bx * H) * i,
+        mx, mz, mu, k, T_A, T_B, EA, dEA,
+    )  # fmt: skip
+
+
+@jit
+def _cubic(p, q):
+    """Positive root of T^3 + p T^2 = q (q > 0), by Newton's method from above."""
+    if p < 0.0:
+        T = q / (p * p)
+        if T + p > 0.0:
+            T = min(T, q ** (1 / 3))
+        T -= p
+    else:
+        T = q ** (1 / 3)
+        if p > T:
+            T = math.sqrt(q / p)
+    for _ in range(30):
+        step = (T * T * (T + p) - q) / (T * (3.0 * T + 2.0 * p))
+        T -= step
+        if step < 1e-4 * T:
+            break
+    return T
+
+
+@jit
+def _deep_sag(ratio):
+    """Solve sinh(xi)/xi = ratio > 1 roughly, in logarithmic form."""
+    if ratio < 3.0:
+        xi = math.sqrt(6.0 * (ratio - 1.0))
+    else:
+        xi = math.log(2.0 * ratio)
+        xi += math.log(xi)
+    if xi < 0.1:
+        return xi
+    target = math.log(2.0 * ratio)
+    for _ in range(4):
+        q = math.exp(-2.0 * xi)
+        value = xi + math.log((1.0 - q) / xi) - target
+        xi -= value / ((1.0 + q) / (1.0 - q) - 1.0 / xi)
+    return xi
+
+
+@jit
+def _guess(Bx, Bz, L, length, run, w, asymptote, softening, offset):
+    """First estimate (H, V_B, l0): parabola with stretch, run and span in series; or a deep sag."""
+    EA = asymptote
+    weight = w * Bx
+    sag = L * weight * weight / (24.0 * length)
+    slack = (length - L - run) / length
+    half = -0.5 * w * Bz  # T_A above the mean tension
+    lift = -half * run / length
+    if softening != 0.0:
+        T = 0.0
+        # The tension that stretches a weightless cable this far under the law: a quadratic.
+        if slack < 0.0:
+            T = -0.5 * (slack * asymptote + offset)
+            T += math.sqrt(T * T - slack * (asymptote * offset - softening))
+        EA, _dEA = secant_stiffness(max(T + half, 0.0), asymptote, softening, offset)
+        T = _cubic(EA * slack - lift, EA * sag)
+        EA, _dEA = secant_stiffness(max(T + half, 0.0), asymptote, softening, offset)
+    T = _cubic(EA * slack - lift, EA * sag)
+    l0 = length
+    if run > 0.0:
+        l0 = length - run / (1.0 + max(T + half, 0.0) / EA)
+    if w * L <= 0.3 * T:
+        # With T the mean of T_A and T_B the equations of the span are explicit.
+        y = 0.5 * w * l0 / T
+        H = Bx / (l0 * (1.0 / EA + (1.0 + y * y / 3.0) / T))
+        return H, Bz / (l0 * (1.0 / EA + 1.0 / T)) + 0.5 * w * l0, l0
+    H = T * Bx / L
+    V_B = T * Bz / L + 0.5 * w * l0
+    stretched = l0 * (1.0 + min(T, w * L) / EA)
+    across = (stretched - Bz) * (stretched + Bz)
+    if across > Bx * Bx * (1.0 + 1e-12):
+        xi = _deep_sag(math.sqrt(across) / Bx)
+        H = weight / (2.0 * xi)
+        V_B = 0.5 * w * (stretched + Bz / math.tanh(xi))
+    return H, V_B, l0
+
+
+@jit
+def _newton(Bx, Bz, L, length, run, w, asymptote, softening, offset, H, V_B, l0):
+    """Newton's method from a good guess. Return (H, V_B, l0, iterations); iterations > 40: failed.
+
+    It ends with a step below 1e-8 of the smallest tension: what is left is the square of that.
+    Failing this (near-vertical cables determine a tiny H to about 1e-8 only), when the residual is
+    round-off.
+    """
+    for iteration in range(1, MAX_ITERATIONS + 1):
+        x, z, r, Kxx, Kxz, Kzx, Kzz, mx, mz, mu, k, T_A, T_B, _EA, _dEA = _linearise(
+            H, V_B, l0, length, run, w, asymptote, softening, offset
+        )
+        rx = Bx - x
+        rz = Bz - z
+        ex = rx - mx * r
+        ez = rz - mz * r
+        dH = Kxx * ex + Kxz * ez
+        dV = Kzx * ex + Kzz * ez
+        dl = mu * r + k * (H * dH + (V_B - w * l0) * dV)
+        if abs(dH) <= 1e-8 * H and abs(dV) <= 1e-8 * min(T_A, T_B) and abs(dl) <= 1e-10 * l0:
+            return H + dH, V_B + dV, l0 + dl, iteration
+        if iteration > 3 and abs(rz) <= 1e-15 * L and abs(r) <= 1e-15 * length:
+            noise = abs(x) + Bx
+            if 2.0 * w * l0 > T_A + T_B:
+                noise += (abs(V_B) + w * l0) * (H / w) * (1.0 / T_A + 1.0 / T_B)
+            if abs(rx) <= 4e-16 * noise:
+                return H, V_B, l0, iteration
+        step = 1.0
+        if dH < -0.9 * H:
+            step = -0.9 * H / dH
+        H += step * dH
+        V_B += step * dV
+        l0 = max(l0 + step * dl, 0.5 * (length - run))
+        if not (H < 1e300 and abs(V_B) < 1e300):
+            break
+    return H, V_B, l0, MAX_ITERATIONS + 1
+
+
+@jit
+def _potential(H, V_B, l0, w, EA, X, S):
+    """Phi(H, V_B) = integral of T + T^2/(2 EA) over the span; its gradient is (x, z)."""
+    V_A = V_B - w * l0
+    V = V_A + V_B
+    squares = H * H + (V_A * V_A + V_A * V_B + V_B * V_B) / 3.0
+    return 0.25 * l0 * (V * V / S + S) + 0.5 * H * X + 0.5 * l0 / EA * squares
+
+
+@jit
+def _minimise(Bx, Bz, L, l0, w, EA, H, V_B):
+    """Minimise the convex Phi - H Bx - V_B Bz, with backtracking, for given l0 and EA.
+
+    Slower than `_newton`, for the cables that defeat it. Return (H, V_B, T_A, iterations).
+    """
+    T_A = H
+    for iteration in range(1, 5 * MAX_ITERATIONS + 1):
+        x, z, _r, Kxx, Kxz, _Kzx, Kzz, _mx, _mz, _mu, _k, T_A, T_B, _EA, _dEA = _linearise(
+            H, V_B, l0, l0, 0.0, w, EA, 0.0, 0.0
+        )
+        rx = Bx - x
+        rz = Bz - z
+        dH = Kxx * rx + Kxz * rz
+        dV = Kxz * rx + Kzz * rz
+        noise = (abs(V_B) + w * l0) * (H / w) * (1.0 / T_A + 1.0 / T_B)
+        floor = abs(rx) <= 4e-16 * (abs(x) + Bx + noise) and abs(rz) <= 1e-15 * L
+        if floor or (abs(dH) <= 1e-12 * H and abs(dV) <= 1e-12 * (T_A + T_B)):
+            return H, V_B, T_A, iteration
+        step = 1.0
+        if dH < -0.9 * H:
+            step = -0.9 * H / dH
+        X = x - H * l0 / EA
+        start = _potential(H, V_B, l0, w, EA, X, T_A + T_B) - H * Bx - V_B * Bz
+        slope = -(rx * dH + rz * dV)
+        for _ in range(40):
+            H1 = H + step * dH
+            V1 = V_B + step * dV
+            TA1, TB1, X1, _Z, _Gxx, _Gxz, _Gzz, _det = _span(H1, V1, l0, w)
+            value = _potential(H1, V1, l0, w, EA, X1, TA1 + TB1) - H1 * Bx - V1 * Bz
+            if value <= start + 1e-4 * step * slope + 1e-13 * (T_A + T_B) * L:
+                break
+            step *= 0.5
+        H += step * dH
+        V_B += step * dV
+    return H, V_B, T_A, 5 * MAX_ITERATIONS + 1
+
+
+@jit
+def _plain_tension(T, Bx, Bz, L, length, run, w, asymptote, softening, offset, H, V_B):
+    """Solve the span with the run and the stiffness taken at the tension T.
+
+    Return (T_A - T, H, V_B, l0, failed).
+    """
+    EA, _dEA = secant_stiffness(T, asymptote, softening, offset)
+    l0 = length - run / (1.0 + T / EA)
+    H, V_B, T_A, iterations = _minimise(Bx, Bz, L, l0, w, EA, H, V_B)
+    return T_A - T, H, V_B, l0, iterations > 5 * MAX_ITERATIONS
+
+
+@jit
+def _bracket(Bx, Bz, L, length, run, w, asymptote, softening, offset):
+    """Find T_A between bounds (Illinois rule) around the plain solver: slow, a last resort.
+
+    Return (H, V_B, l0, iterations, failed).
+    """
+    H, V_B, l0 = _guess(Bx, Bz, L, length, run, w, asymptote, softening, offset)
+    low = 0.0
+    at_low, H, V_B, l0, failed = _plain_tension(
+        low, Bx, Bz, L, length, run, w, asymptote, softening, offset, H, V_B
+    )
+    if failed:
+        return H, V_B, l0, 1, True
+    if run == 0.0 and softening == 0.0:
+        return H, V_B, l0, 1, False
+    high = at_low
+    at_high = at_low
+    for _ in range(60):
+        at_high, H, V_B, l0, failed = _plain_tension(
+            high, Bx, Bz, L, length, run, w, asymptote, softening, offset, H, V_B
+        )
+        if failed or at_high <= 0.0:
+            break
+        low, at_low = high, at_high
+        high *= 2.0
+    side = 0
+    value = at_high
+    for iteration in range(1, 201):
+        if failed or abs(value) <= 1e-14 * high or high - low <= 1e-15 * high:
+            return H, V_B, l0, iteration, failed
+        T = (at_low * high - at_high * low) / (at_low - at_high)
+        value, H, V_B, l0, failed = _plain_tension(
+            T, Bx, Bz, L, length, run, w, asymptote, softening, offset, H, V_B
+        )
+        if value > 0.0:
+            low, at_low = T, value
+            at_high *= 0.5 if side == 1 else 1.0
+            side = 1
+        else:
+            high, at_high = T, value
+            at_low *= 0.5 if side == -1 else 1.0
+            side = -1
+    return H, V_B, l0, 201, True
+
+
+@jit
+def _admissible(Bx, L, length, run, w, asymptote, softening, offset):
+    """Whether the numbers describe a cable; false for NaN and for no span left beside the run."""
+    if not (MIN_LENGTH <= L <= MAX_LENGTH and Bx >= 0.0):
+        return False
+    if not (run >= 0.0 and length - run >= MIN_LENGTH and length <= MAX_LENGTH):
+        return False
+    if not (0.0 <= w <= MAX_WEIGHT and MIN_STIFFNESS <= asymptote <= MAX_STIFFNESS):
+        return False
+    if softening == 0.0:
+        return True
+    if not (softening > 0.0 and offset > 0.0 and offset <= MAX_STIFFNESS):
+        return False
+    return asymptote - softening / offset >= MIN_STIFFNESS
+
+
+@jit
+def _solve(Bx, Bz, L, length, run, w, asymptote, softening, offset):
+    """Solve an admissible cable. Return (H, V_B, l0, iterations, failed)."""
+    H, V_B, l0 = _guess(Bx, Bz, L, length, run, w, asymptote, softening, offset)
+    H, V_B, l0, iterations = _newton(
+        Bx, Bz, L, length, run, w, asymptote, softening, offset, H, V_B, l0
+    )
+    if iterations <= MAX_ITERATIONS:
+        return H, V_B, l0, iterations, False
+    H, V_B, l0, more, failed = _bracket(Bx, Bz, L, length, run, w, asymptote, softening, offset)
+    return H, V_B, l0, iterations + more, failed
+
+
+@jit
+def solve_catenary(Bx, Bz, l0, w, EA):
+    """Solve a span without run for its end force. Return (H, V_B, iterations, status)."""
+    if not (math.isfinite(Bx) and math.isfinite(Bz)):
+        return 0.0, 0.0, 0, 1
+    L = math.sqrt(Bx * Bx + Bz * Bz)
+    if not (_admissible(Bx, L, l0, 0.0, w, EA, 0.0, 0.0) and Bx > 0.0):
+        return 0.0, 0.0, 0, 1
+    H, V_B, _l0, iterations, failed = _solve(
+        max(Bx, 1e-10 * L), Bz, L, l0, 0.0, max(w, MIN_WEIGHT), EA, 0.0, 0.0
+    )
+    return H, V_B, iterations, 1 if failed else 0
+
+
+@jit
+def _chord(i, p_WA, p_WB):
+    """Return (dx, dy, Bz, Bx, L) of cable i; a vertical cable leans a little towards +x."""
+    dx = float(p_WB[i, 0]) - float(p_WA[i, 0])
+    dy = float(p_WB[i, 1]) - float(p_WA[i, 1])
+    Bz = float(p_WB[i, 2]) - float(p_WA[i, 2])
+    Bx = math.sqrt(dx * dx + dy * dy)
+    lean = MIN_LEAN * abs(Bz)
+    if Bx < lean:
+        dx = lean
+        dy = 0.0
+        Bx = lean
+    return dx, dy, Bz, Bx, math.sqrt(Bx * Bx + Bz * Bz)
+
+
+@jit
+def _damping(i, dx, dy, Bz, L, v_WB, length, rate, damping_time, EA, lowest):
+    """Return (T_d, clipped, L'): tension EA t_d (L' - l')/l of the structural damping, not below
+    -lowest so that no cable pushes, and the rate of the chord.
+    """
+    vx = float(v_WB[i, 0])
+    vy = float(v_WB[i, 1])
+    chord_rate = (dx * vx + dy * vy + Bz * float(v_WB[i, 2])) / L
+    T_d = EA * damping_time * (chord_rate - rate) / length
+    if T_d < -lowest:
+        return -lowest, True, chord_rate
+    return T_d, False, chord_rate
+
+
+@jit
+def _force(i, p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, damping_time, out):
+    """Write row i of `out`. Return (failed, H, V_B, Bx) for the Jacobian, Bx as clamped."""
+    dx, dy, Bz, Bx, L = _chord(i, p_WA, p_WB)
+    l = float(length[i])
+    run = float(drum_run[i])
+    rate = float(length_rate[i])
+    asymptote = float(stiffness[0])
+    softening = float(stiffness[1])
+    offset = float(stiffness[2])
+    speed = abs(float(v_WB[i, 0])) + abs(float(v_WB[i, 1])) + abs(float(v_WB[i, 2])) + abs(rate)
+    moves = speed <= MAX_SPEED and 0.0 <= damping_time <= MAX_DAMPING_TIME
+    if not (moves and _admissible(Bx, L, l, run, w, asymptote, softening, offset)):
+        return True, 0.0, 0.0, Bx
+    w = max(w, MIN_WEIGHT)
+    clamped = max(Bx, MIN_SLOPE * L)
+    H, V_B, l0, _iterations, failed = _solve(
+        clamped, Bz, L, l, run, w, asymptote, softening, offset
+    )
+    # H/Bx stays finite for a vertical cable: with it the horizontal force needs no direction.
+    q = H / clamped
+    hx = q * dx
+    hy = q * dy
+    h = q * Bx
+    V_A = V_B - w * l0
+    T_A = math.sqrt(h * h + V_A * V_A)
+    T_B = math.sqrt(h * h + V_B * V_B)
+    EA, _dEA = secant_stiffness(T_A, asymptote, softening, offset)
+    T_d, _clipped, _rate = _damping(
+        i, dx, dy, Bz, L, v_WB, l, rate, damping_time, EA, min(T_A, T_B)
+    )
+    scale = -(1.0 + T_d / T_B)
+    out[i, 0] = scale * hx
+    out[i, 1] = scale * hy
+    out[i, 2] = scale * V_B
+    out[i, 3] = T_A + T_d
+    out[i, 4] = T_B + T_d
+    out[i, 5] = hx / T_A
+    out[i, 6] = hy / T_A
+    out[i, 7] = V_A / T_A
+    out[i, 8] = hx / T_B
+    out[i, 9] = hy / T_B
+    out[i, 10] = V_B / T_B
+    # V_B Bx - H Bz with Bx, Bz replaced by the equations of the span: the chord cancels.
+    f = l0 / (T_A + T_B)
+    y = w * f
+    bend = w * l0 * (0.5 * l0 / EA + f)
+    if y < 0.9:
+        bend += 2.0 * V_B * f * y * y * _series(y * y)
+        cross = h * bend
+    else:
+        cross = V_B * Bx - h * Bz
+    out[i, 11] = math.atan2(cross, h * Bx + V_B * Bz)
+    out[i, 12] = h
+    out[i, 13] = l0
+    return failed or not math.isfinite(T_d + V_B + h + T_A), H, V_B, clamped
+
+
+@jit
+def cable_forces(p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, damping_time, out):
+    """Write the state of each cable into `out` (k, 14). Return 0, or 1 + the index that failed.
+
+    Columns: 0:3 force of the cable on the platform at B, in W [N]; 3 T_A, 4 T_B with damping [N];
+    5:8, 8:11 unit tangents at A and B, directed from A to B, in W; 11 angle at B from the chord to
+    the cable [rad]; 12 H without damping [N]; 13 unstrained length of the span [m].
+    """
+    for i in range(len(length)):
+        failed, _H, _V_B, _Bx = _force(
+            i, p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, damping_time, out
+        )
+        if failed:
+            return i + 1
+    return 0
+
+
+@jit
+def _differentiate(
+    i, p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, damping_time,
+    H, V_B, clamped, out, jacobian,
+):  # fmt: skip
+    """Write jacobian[i] from the solution in out[i]. Return whether a number is not finite."""
+    dx, dy, Bz, Bx, L = _chord(i, p_WA, p_WB)
+    l = float(length[i])
+    rate = float(length_rate[i])
+    run = float(drum_run[i])
+    w = max(w, MIN_WEIGHT)
+    l0 = float(out[i, 13])
+    _x, _z, _r, Kxx, Kxz, Kzx, Kzz, mx, mz, mu, k, T_A, T_B, EA, dEA = _linearise(
+        H, V_B, l0, l, run, w, float(stiffness[0]), float(stiffness[1]), float(stiffness[2])
+    )
+    q = H / clamped
+    hx = q * dx
+    hy = q * dy
+    h = q * Bx
+    V_A = V_B - w * l0
+    T_A = math.sqrt(h * h + V_A * V_A)
+    T_B = math.sqrt(h * h + V_B * V_B)
+    T_d, clipped, chord_rate = _damping(
+        i, dx, dy, Bz, L, v_WB, l, rate, damping_time, EA, min(T_A, T_B)
+    )
+    s = 1.0 + T_d / T_B
+    viscosity = EA * damping_time / l
+    if clipped:
+        viscosity = 0.0
+    for c in (0, 1, 2, 6):
+        px = 1.0 if c == 0 else 0.0
+        py = 1.0 if c == 1 else 0.0
+        pz = 1.0 if c == 2 else 0.0
+        if c == 6:
+            dBx = 0.0
+            dH = -(Kxx * mx + Kxz * mz)
+            dV_B = -(Kzx * mx + Kzz * mz)
+            dl0 = mu + k * (H * dH + V_A * dV_B)
+            dT_d = -T_d / l
+        else:
+            if clamped > Bx:
+                dBx = MIN_SLOPE * (dx * px + dy * py + Bz * pz) / L
+            else:
+                dBx = (dx * px + dy * py) / Bx
+            dH = Kxx * dBx + Kxz * pz
+            dV_B = Kzx * dBx + Kzz * pz
+            dl0 = k * (H * dH + V_A * dV_B)
+            along = (dx * px + dy * py + Bz * pz) / L
+            dT_d = viscosity * (float(v_WB[i, c]) - chord_rate * along) / L
+        dq = (dH - q * dBx) / clamped
+        dhx = dq * dx + q * px
+        dhy = dq * dy + q * py
+        dh = dq * Bx + q * (dx * px + dy * py) / Bx
+        dV_A = dV_B - w * dl0
+        dT_A = (h * dh + V_A * dV_A) / T_A
+        dT_B = (h * dh + V_B * dV_B) / T_B
+        if clipped:
+            dT_d = -(dT_A if T_A < T_B else dT_B)
+        else:
+            dT_d += T_d * dEA / EA * dT_A
+        ds = (dT_d - T_d * dT_B / T_B) / T_B
+        jacobian[i, 0, c] = -(s * dhx + ds * hx)
+        jacobian[i, 1, c] = -(s * dhy + ds * hy)
+        jacobian[i, 2, c] = -(s * dV_B + ds * V_B)
+        jacobian[i, 3, c] = dT_A + dT_d
+        jacobian[i, 4, c] = dT_B + dT_d
+        jacobian[i, 5, c] = (dhx - hx * dT_A / T_A) / T_A
+        jacobian[i, 6, c] = (dhy - hy * dT_A / T_A) / T_A
+        jacobian[i, 7, c] = (dV_A - V_A * dT_A / T_A) / T_A
+        jacobian[i, 8, c] = (dhx - hx * dT_B / T_B) / T_B
+        jacobian[i, 9, c] = (dhy - hy * dT_B / T_B) / T_B
+        jacobian[i, 10, c] = (dV_B - V_B * dT_B / T_B) / T_B
+        turn = (Bx * pz - Bz * (dx * px + dy * py) / Bx) / (L * L)
+        jacobian[i, 11, c] = (h * dV_B - V_B * dh) / (T_B * T_B) - turn
+        jacobian[i, 12, c] = dh
+        jacobian[i, 13, c] = dl0
+    for c in (3, 4, 5, 7):
+        dT_d = -viscosity
+        if c == 3:
+            dT_d = viscosity * dx / L
+        elif c == 4:
+            dT_d = viscosity * dy / L
+        elif c == 5:
+            dT_d = viscosity * Bz / L
+        for row in range(5, 14):
+            jacobian[i, row, c] = 0.0
+        for row in range(3):
+            jacobian[i, row, c] = -dT_d * out[i, 8 + row]
+        jacobian[i, 3, c] = dT_d
+        jacobian[i, 4, c] = dT_d
+    return not math.isfinite(Kxx + Kxz + Kzx + Kzz + mx + mz + viscosity)
+
+
+@jit
+def cable_forces_jacobian(
+    p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, damping_time, out, jacobian
+):
+    """As `cable_forces`, and write d out / d(p_WB, v_WB, length, length_rate) to `jacobian`
+    (k, 14, 8). Where the damping is held at its limit the derivative is that of the limit.
+    """
+    for i in range(len(length)):
+        failed, H, V_B, Bx = _force(
+            i, p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, damping_time, out
+        )
+        if not failed:
+            failed = _differentiate(
+                i, p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, damping_time,
+                H, V_B, Bx, out, jacobian,
+            )  # fmt: skip
+        if failed:
+            return i + 1
+    return 0
+
+
+@jit
+def irvine_row_softening(Bx, Bz, H, w, asymptote, softening, offset):
+    """The span that carries the horizontal tension H, for EA(T_A), and its derivatives.
+
+    Return (V_B, l0, dV_B/dBx, dV_B/dBz, dV_B/dH, dl0/dBx, dl0/dBz, dl0/dH, status).
+    """
+    zero = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1)
+    if not (math.isfinite(Bz) and 0.0 < Bx < MAX_LENGTH and 0.0 < H < MAX_STIFFNESS):
+        return zero
+    L = math.sqrt(Bx * Bx + Bz * Bz)
+    if not _admissible(Bx, L, 1.0, 0.0, w, asymptote, softening, offset):
+        return zero
+    w = max(w, MIN_WEIGHT)
+    half = 0.5 * w * Bx / H
+    if half > 300.0:
+        return zero
+    # Inextensible catenary, shortened by its stretch.
+    across = Bx * (1.0 + half * half / 6.0)
+    if half > 1e-4:
+        across = 2.0 * H / w * math.sinh(half)
+    m = math.asinh(Bz / across)
+    V_B = H * math.sinh(m + half)
+    l0 = across * math.cosh(m)
+    EA, _dEA = secant_stiffness(H * math.cosh(m), asymptote, softening, offset)
+    l0 /= 1.0 + H * math.cosh(m) / EA
+    converged = False
+    for _ in range(MAX_ITERATIONS):
+        V_A = V_B - w * l0
+        T_A, T_B, X, Z, Gxx, Gxz, Gzz, _det = _span(H, V_B, l0, w)
+        EA, dEA = secant_stiffness(T_A, asymptote, softening, offset)
+        e = l0 / EA
+        Vm = 0.5 * (V_A + V_B)
+        d = -e * dEA / (EA * T_A)
+        g = 1.0 / EA + 1.0 / T_A
+        # Columns of d(x, z)/d(H, V_B, l0)
+        xH = Gxx + e + d * H * H
+        xV = Gxz + d * H * V_A
+        xl = g * H - d * H * w * V_A
+        zH = Gxz + d * Vm * H
+        zV = Gzz + e + d * Vm * V_A
+        zl = g * V_A - d * Vm * w * V_A
+        div = xl * zV - xV * zl
+        rx = Bx - X - H * e
+        rz = Bz - Z - Vm * e
+        dV = (xl * rz - zl * rx) / div
+        dl = (zV * rx - xV * rz) / div
+        if converged:
+            return (
+                V_B + dV, l0 + dl,
+                -zl / div, xl / div, (zl * xH - xl * zH) / div,
+                zV / div, -xV / div, (xV * zH - zV * xH) / div,
+                0,
+            )  # fmt: skip
+        # Then once more round, so that the derivatives are taken at the solution.
+        converged = abs(dV) <= 1e-8 * min(T_A, T_B) and abs(dl) <= 1e-8 * l0
+        converged = converged or abs(rx) + abs(rz) <= 1e-15 * L
+        step = 1.0
+        if dl < -0.5 * l0:
+            step = -0.5 * l0 / dl
+        V_B += step * dV
+        l0 += step * dl
+        if not (l0 < 1e300 and abs(V_B) < 1e300):
+            break
+    return zero
+
+
+@jit
+def irvine_row(Bx, Bz, H, w, EA):
+    """As `irvine_row_softening` for a constant EA."""
+    return irvine_row_softening(Bx, Bz, H, w, EA, 0.0, 0.0)
+
+
+@jit
+def irvine_from_horizontal(Bx, Bz, H, w, EA):
+    """Return (V_B, l0, status) of the span that carries the horizontal tension H."""
+    V_B, l0, _a, _b, _c, _d, _e, _f, status = irvine_row_softening(Bx, Bz, H, w, EA, 0.0, 0.0)
+    return V_B, l0, status
