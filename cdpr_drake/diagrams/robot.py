@@ -78,7 +78,8 @@ def make_cable_robot(robot: CableRobot) -> Diagram:
         - motor_torques
 
     Blocks: "platform", "cables", "winches", and "transmission" from motor angles to lengths; the
-    rest splits and adds signals. pose (6) is [roll, pitch, yaw, x, y, z] (rad, m) of X_WP; external_wrench (6) is [torque; force] at the platform's origin in W.
+    rest splits and adds signals. pose (6) is [roll, pitch, yaw, x, y, z] (rad, m) of X_WP;
+    external_wrench (6) is [torque; force] at the platform's origin in W.
 
     Args:
         robot: the robot; any number of cables.
