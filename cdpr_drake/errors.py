@@ -35,10 +35,14 @@ class LinearizationError(CdprError, ValueError):
 
 
 class CableError(CdprError, RuntimeError):
-    """A cable leaves what the model covers. `cable` counts from 1, as in the paper."""
+    """A cable leaves what the model covers.
 
-    def __init__(self, cable: int, time: float, message: str) -> None:
-        super().__init__(f"cable {cable} at t = {time:.6g} s: {message}")
+    `cable` counts from 1, as in the paper; `time` [s] is None outside of a run.
+    """
+
+    def __init__(self, cable: int, time: float | None, message: str) -> None:
+        when = "" if time is None else f" at t = {time:.6g} s"
+        super().__init__(f"cable {cable}{when}: {message}")
         self.cable, self.time, self.message = cable, time, message
 
     def __reduce__(self):

@@ -11,7 +11,6 @@ and whose weight is neglected: l0 = length - R / (1 + T_A / EA). Frames: W, z up
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,17 +20,6 @@ from numpy.typing import ArrayLike, NDArray
 from cdpr_drake.errors import CableError
 
 Array = NDArray[np.float64]
-
-
-class NoCatenaryError(CableError):
-    """No elastic catenary has the ends and the length given. `time` is NaN: there is none."""
-
-    def __init__(self, cable: int, message: str) -> None:
-        super().__init__(cable, math.nan, message)
-        self.args = (f"cable {cable}: {message}",)
-
-    def __reduce__(self):
-        return type(self), (self.cable, self.message)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,7 +63,7 @@ def elastic_catenary(
         drum_run: (k,) or one number [m], geometric length of the run from the drum to A.
 
     Raises:
-        NoCatenaryError: (a CableError) the length does not exceed the run, B is at A, a number is
+        CableError: the length does not exceed the run, B is at A, a number is
             not finite or out of all range.
         ValueError: shapes that do not match.
     """
@@ -91,8 +79,9 @@ def elastic_catenary(
     )  # fmt: skip
     if status:
         i = status - 1
-        raise NoCatenaryError(
+        raise CableError(
             status,
+            None,
             f"no elastic catenary of unstrained length {length[i]:.6g} m, of which {run[i]:.6g} m "
             f"run from the drum, over a chord of {np.linalg.norm(p[i]):.6g} m",
         )
@@ -182,7 +171,7 @@ def cable_energy(
 
     Raises:
         ValueError: a stiffness that depends on the tension, or shapes that do not match.
-        NoCatenaryError: as `elastic_catenary`.
+        CableError: as `elastic_catenary`.
     """
     EA, softening, _offset = _law(stiffness)
     if softening != 0.0:

@@ -94,7 +94,7 @@ class Cable(Record):
         section: metallic cross-section [m2].
         stiffness: AxialStiffness; a number [N] stands for a constant EA.
         damping_time: [s], axial damping is EA * damping_time per unit of strain rate.
-        drum_run: (k,) [m], unstrained length from the drum to the drawing point; a number stands
+        drum_run: (k,) [m], geometric length from the drum to the drawing point; a number stands
             for all cables.
         min_tension: [N], the lowest a tension distribution may ask for.
         max_tension: [N], the highest a tension distribution may ask for.
