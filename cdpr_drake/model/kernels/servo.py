@@ -75,14 +75,20 @@ def rotation_log(R, out):
 
 @jit
 def solve_symmetric(G, b):
-    """Solve G x = b in place of b by LDL^T, for G symmetric (6, 6); False if G is singular."""
+    """Solve G x = b in place of b by LDL^T, for G symmetric (6, 6); False if G is singular.
+
+    G = D D^T is taken for singular where a pivot is below 1e-12 of its largest diagonal entry: a
+    singular value of D near 1e-6 of the largest, as in `statics.check_rank`.
+    """
     n = b.shape[0]
+    largest = 0.0
     for j in range(n):
-        scale = abs(G[j, j].real)
+        largest = max(largest, G[j, j].real)
+    for j in range(n):
         d = G[j, j]
         for m in range(j):
             d = d - G[j, m] * G[j, m] * G[m, m]
-        if not d.real > 1e-11 * scale:
+        if not d.real > 1e-12 * largest:
             return False
         G[j, j] = d
         for i in range(j + 1, n):
