@@ -14,6 +14,8 @@ from importlib.metadata import version
 import hypothesis
 import pytest
 
+from cdpr_drake.model.robot import CableRobot, load_robot
+
 os.environ.setdefault("MPLBACKEND", "Agg")  # figures open no window
 
 # No deadline: a test must not fail because the machine is busy or numba compiles.
@@ -103,3 +105,9 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
             is_here, reason = NEEDS[name]
             if not is_here():
                 pytest.skip(reason)
+
+
+@pytest.fixture(scope="session")
+def cogiro() -> CableRobot:
+    """Return the default robot."""
+    return load_robot("cogiro")
