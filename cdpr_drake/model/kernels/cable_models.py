@@ -1,12 +1,17 @@
 """The paper's four cable models, one cable at a time (Dallej et al. 2019, eqs. 2, 4 to 9, 11).
 
-Every function takes real or complex numbers, mixed as they come: evaluated at x + i h, the
-imaginary part divided by h is the exact derivative. Branches look at real parts only.
+Arguments throughout: Bx, Bz [m] of B from A in the cable's plane, x horizontal, z up; H [N]
+horizontal tension, T [N] chord tension, T_A [N] tension at the drawing point; w [N/m] weight per
+unstrained metre; EA [N]; model ECM = 0, CMWE = 1, SCMWE = 2, SLSM = 3, where ECM and CMWE share the
+catenary's shape and the SCMWE's is a parabola; order of the ECM's series. Nothing is checked here.
 
-The chord of length L from A to B has the direction (c, s) in the cable's plane, x horizontal from
-A towards B, z up. Lengths and rows are formed from L, c, s and the chord tension T = H / c, which
-stay finite for a vertical cable, where Bx and H are 0. With h = w L / (2 T) and l the length of the
-CMWE, sinh m = Bz / (L c shc h) and cosh m = l / (L c shc h): no logarithm is needed.
+They are real or complex, mixed as they come: evaluated at x + i h, the imaginary part divided by h
+is the exact derivative. Branches look at real parts only.
+
+The chord from A to B has the length L and the direction (c, s). Lengths and rows are formed from
+L, c, s and T = H / c, which stay finite for a vertical cable, where Bx and H are 0. Of the angles h
+and m of eq. (2) only h = w L / 2T is formed: sinh m = Bz / (Bx shc h), and with l the length of
+the CMWE cosh m = l / (Bx shc h), so that no logarithm is needed.
 
 No sum below cancels as w -> 0 or h -> 0; each tends to the straight cable's value.
 """
@@ -22,7 +27,7 @@ from cdpr_drake.model.kernels import is_compiled, jit
 
 ECM, CMWE, SCMWE, SLSM = range(4)
 
-MAX_NEWTON_STEPS = 60  # 4 to 6 when taut; more where the two branches meet, each step halving
+MAX_NEWTON_STEPS = 60  # 2 to 4 when taut; up to 20 where the branches meet and steps only halve
 
 
 def _python_sqrt(x):
@@ -44,7 +49,7 @@ def shc_coshc(h):
         shc = np.sinh(h) / h
         return shc, np.cosh(h) - shc
     # Taylor series in x, nested: the terms x^k / (2k + 1)! and 2k x^k / (2k + 1)!
-    shc = 1.0 + x / 156.0 * (1.0 + x / 210.0 * (1.0 + x / 272.0 * (1.0 + x / 342.0)))
+    shc = 1.0 + x / 156.0 * (1.0 + x / 210.0 * (1.0 + x / 272.0))
     shc = 1.0 + x / 42.0 * (1.0 + x / 72.0 * (1.0 + x / 110.0 * shc))
     shc = 1.0 + x / 6.0 * (1.0 + x / 20.0 * shc)
     coshc = 1.0 + x / 130.0 * (1.0 + x / 180.0 * (1.0 + x / 238.0 * (1.0 + x / 304.0)))
@@ -65,7 +70,7 @@ def ashc_oma(y):
     power = 2.0 * x
     oma = power / 3.0
     k = 1
-    while power.real > 1e-18 * oma.real:
+    while power.real > 1e-15 * oma.real:
         k += 1
         power = power * x
         oma = oma + power / (4 * k * k - 1)
@@ -88,7 +93,7 @@ def angle(y, x):
 def catenary_parameters(Bx, Bz, H, w):
     """Return (a, m, h) of the profile (eq. 2): a is the asinh of the slope at A, m + h that at B.
 
-    Bx, Bz [m], H [N], w [N/m]. The paper's a_i, in a form that neither cancels nor overflows.
+    The paper's a_i, in a form that neither cancels nor overflows.
     """
     h = 0.5 * w * Bx / H
     if h.real > 700.0:
@@ -100,10 +105,7 @@ def catenary_parameters(Bx, Bz, H, w):
 
 @jit
 def profile_height(model, x, Bx, Bz, H, w):
-    """Return the height z(x) [m] of the cable over A (eq. 2; the parabola for the SCMWE).
-
-    model: ECM and CMWE share the catenary; x, Bx, Bz [m], H [N], w [N/m].
-    """
+    """Return the height z(x) [m] of the cable over A at the distance x [m] (eq. 2)."""
     if model == SLSM:
         return x * Bz / Bx
     if model == SCMWE:
@@ -115,10 +117,7 @@ def profile_height(model, x, Bx, Bz, H, w):
 
 @jit
 def largest_sag(model, Bx, Bz, H, w):
-    """Return the largest vertical distance [m] from the chord down to the cable.
-
-    model: ECM and CMWE share the catenary; Bx, Bz [m], H [N], w [N/m].
-    """
+    """Return the largest vertical distance [m] from the chord down to the cable."""
     if model == SLSM:
         return 0.0
     if model == SCMWE:
@@ -141,8 +140,7 @@ def cable_ends(model, Bx, Bz, H, w):
 
     Eqs. (4) and (5). Angles [rad] from the horizontal: alpha of the tangent at A, beta of that at
     B, beta0 of the chord, dbeta = beta - beta0 without cancellation. V_A, V_B [N]: vertical part of
-    the tension, directed from A to B. model: ECM and CMWE share the catenary, the SCMWE's is the
-    parabola; Bx, Bz [m], H [N], w [N/m].
+    the tension, directed from A to B.
     """
     L = sqrt(Bx * Bx + Bz * Bz)
     c, s = Bx / L, Bz / L
@@ -165,12 +163,13 @@ def cable_ends(model, Bx, Bz, H, w):
 def largest_tension(Bx, Bz, T, w):
     """Return the tension [N] at the upper end of the catenary, the largest along the cable.
 
-    By T_A + T_B = w l coth h and T_B - T_A = w Bz. Bx, Bz [m], T [N] of the chord, w [N/m].
+    By T_A + T_B = w l coth h and T_B - T_A = w Bz.
     """
     L = sqrt(Bx * Bx + Bz * Bz)
     shc, coshc = shc_coshc(0.5 * w * L / T)
     length = sqrt(Bz * Bz + Bx * shc * Bx * shc)
-    return T * length / L * (1.0 + coshc / shc) + 0.5 * w * abs(Bz)
+    rise = Bz if Bz.real >= 0.0 else -Bz
+    return T * length / L * (1.0 + coshc / shc) + 0.5 * w * rise
 
 
 # --- lengths and rows
@@ -183,8 +182,7 @@ def _catenary_terms(order, L, c, s, T, w, EA):
     The j-th power of cosh u is written with multiples n = j - 2k of the angle, as in the paper.
     Here the outer sum runs over n: sinh(n h) / sinh h and eps^(n-1) cosh(n m), eps^(n-1) sinh(n m)
     with eps = H / EA follow from one recurrence each, and the inner sum over k has no functions.
-
-    order: of the series, 1 for the CMWE; L [m], c, s: the chord; T [N], w [N/m], EA [N].
+    Terms that grow as cosh(n m) near the vertical stay apart in sum_C, for the callers to scale.
     """
     shc, coshc = shc_coshc(0.5 * w * L / T)
     cosh_h = shc + coshc
@@ -204,7 +202,7 @@ def _catenary_terms(order, L, c, s, T, w, EA):
         constant = constant + term
         constant_H = constant_H + (j - 1) * term
         term = term * eps2 * (j + 1.0) / (j + 2.0)
-    length, near_B, N2, lower, inner = L * c * constant, 0.0, 0.0, 0.0, 0.0
+    length, sum_R, N2, sum_C, inner = L * c * constant, 0.0, 0.0, 0.0, 0.0
     U, U_before = 1.0, 0.0  # sinh(n h) / sinh h, here and below for n, and for n - 1
     C, C_before = l_c, eps * lam  # lam eps^(n-1) cosh(n m), and eps^2 times that for n - 1
     S, S_before = Bz, 0.0  # the same of sinh
@@ -223,9 +221,9 @@ def _catenary_terms(order, L, c, s, T, w, EA):
             total = total + term
         UC = U * C
         length = length + total * UC / n
-        near_B = near_B + total * U * R
+        sum_R = sum_R + total * U * R
         N2 = N2 + total * U * S
-        lower = lower + total * U_before * C
+        sum_C = sum_C + total * U_before * C
         inner = inner + total_k * UC
         if n < order:
             R = eps * C / l_c
@@ -234,29 +232,23 @@ def _catenary_terms(order, L, c, s, T, w, EA):
             S, S_before = twice_cosh_m * S - S_before, eps2 * S
             lead = -0.5 * lead
     N2 = N2 / l_c
-    lower = lower * inverse
-    along_H = constant_H + inner * strain * eps / L
-    return length, N2, near_B, lower, constant, along_H, shc, coshc
+    sum_C = sum_C * inverse
+    rest_H = constant_H + inner * strain * eps / L
+    return length, N2, sum_R, sum_C, constant, rest_H, shc, coshc
 
 
 @jit
-def _parabola_terms(L, c, s, T, w):
-    """Return (q, cY, ashc, oma) of eq. (8): L, c, s the chord, T [N], w [N/m].
+def _parabola_terms(L, c, T, w):
+    """Return (q, cY, ashc, oma) of eq. (8).
 
     q = (T_A + T_B) / T; Y as in l = (L / 2) (q / 2 + 2 s^2 / q + c^2 Y ashc(rho Y)), rho = w L / T.
     """
     rho = w * L / T
-    at_B = s + 0.5 * rho
-    at_A = s - 0.5 * rho
-    end_B = sqrt(c * c + at_B * at_B)
-    end_A = sqrt(c * c + at_A * at_A)
-    q = end_A + end_B
-    taut = 1.0 - 0.25 * rho * rho
-    if rho.real > 2.0:
-        # 1e-300 keeps a vertical cable, folded at this rho, from a division by zero
-        Y = q * (end_A * end_B - taut) / (rho * c * rho * c + 1e-300)
-    else:
-        Y = q / (end_A * end_B + taut)
+    x, y = 1.0 - 0.25 * rho * rho, rho * c
+    product = sqrt(x * x + y * y)  # T_A T_B / T^2
+    q = sqrt(2.0 + 0.5 * rho * rho + 2.0 * product)
+    # Two forms of one number; 1e-300 keeps a vertical cable, folded from rho = 2, finite.
+    Y = q * (product - x) / (y * y + 1e-300) if rho.real > 2.0 else q / (product + x + 1e-300)
     ashc, oma = ashc_oma(rho * Y)
     return q, c * Y, ashc, oma
 
@@ -265,8 +257,7 @@ def _parabola_terms(L, c, s, T, w):
 def length_and_row(model, order, Bx, Bz, H, w, EA):
     """Return (l, N1, N2, N3): unstrained length and its row, dl = N1 dBx + N2 dBz + N3 dH.
 
-    Eqs. (6) to (9) and (11). model: ECM = 0, CMWE = 1, SCMWE = 2, SLSM = 3; order: of the ECM.
-    Bx, Bz [m], H [N], w [N/m], EA [N]; l [m], N1, N2 [-], N3 [m/N]. Nothing is checked here.
+    Eqs. (6) to (9) and (11). l [m], N1, N2 [-], N3 [m/N].
     """
     L = sqrt(Bx * Bx + Bz * Bz)
     c, s = Bx / L, Bz / L
@@ -274,44 +265,44 @@ def length_and_row(model, order, Bx, Bz, H, w, EA):
     if model == SLSM:
         return L, c, s, 0.0
     if model == SCMWE:
-        q, cY, ashc, oma = _parabola_terms(L, c, s, T, w)
+        q, cY, ashc, oma = _parabola_terms(L, c, T, w)
         length = 0.5 * L * (0.5 * q + 2.0 * s * s / q + c * cY * ashc)
         N1 = 0.5 * cY * (1.0 + ashc + c * c * oma)
         N2 = 2.0 * s / q + 0.5 * s * c * cY * oma
         return length, N1, N2, -0.5 * L / T * cY * oma
     if model == CMWE:
         order = 1
-    length, N2, near_B, lower, constant, along_H, shc, coshc = _catenary_terms(
+    length, N2, sum_R, sum_C, constant, rest_H, shc, coshc = _catenary_terms(
         order, L, c, s, T, w, EA
     )
-    N1 = (shc + coshc) * near_B - lower / c + constant
-    return length, N1, N2, L / T * (lower / c + along_H - coshc * near_B)
+    N1 = (shc + coshc) * sum_R - sum_C / c + constant
+    return length, N1, N2, L / T * (sum_C / c + rest_H - coshc * sum_R)
 
 
 @jit
 def length_and_row_T(model, order, Bx, Bz, T, w, EA):
     """Return (l, M1, M2, M3): as `length_and_row` with dl = M1 dBx + M2 dBz + M3 dT; Bx >= 0.
 
-    The chord tension T = H L / Bx [N] instead of H keeps the row finite up to the vertical cable.
-    model, order, Bx, Bz [m], w [N/m], EA [N] as there; M1, M2 [-], M3 [m/N].
+    The chord tension T = H L / Bx instead of H keeps the row finite up to the vertical cable. M1,
+    M2 [-], M3 [m/N].
     """
     L = sqrt(Bx * Bx + Bz * Bz)
     c, s = Bx / L, Bz / L
     if model == SLSM:
         return L, c, s, 0.0
     if model == SCMWE:
-        q, cY, ashc, oma = _parabola_terms(L, c, s, T, w)
+        q, cY, ashc, oma = _parabola_terms(L, c, T, w)
         length = 0.5 * L * (0.5 * q + 2.0 * s * s / q + c * cY * ashc)
         M1 = cY * (c * c + s * s * ashc)
         M2 = 2.0 * s / q + s * c * cY * oma
         return length, M1, M2, -0.5 * L / T * c * cY * oma
     if model == CMWE:
         order = 1
-    length, N2, near_B, lower, constant, along_H, shc, coshc = _catenary_terms(
+    length, N2, sum_R, sum_C, constant, rest_H, shc, coshc = _catenary_terms(
         order, L, c, s, T, w, EA
     )
-    N3 = lower + c * (along_H - coshc * near_B)  # times c T / L
-    M1 = near_B * (shc + c * c * coshc) - c * lower + constant + s * s * along_H
+    N3 = sum_C + c * (rest_H - coshc * sum_R)  # times c T / L
+    M1 = sum_R * (shc + c * c * coshc) - c * sum_C + constant + s * s * rest_H
     return length, M1, N2 - s * N3, L / T * N3
 
 
@@ -320,10 +311,7 @@ def length_and_row_T(model, order, Bx, Bz, T, w, EA):
 
 @jit
 def _drawing_point(L, c, s, T, w):
-    """Return (T_A, V_A / T_A, dV_A/dT, shc h, coshc h, l) on the chord (L, c, s).
-
-    Of the catenary; T [N], w [N/m].
-    """
+    """Return (T_A, V_A / T_A, dV_A/dT, shc h, coshc h, l) of the catenary."""
     shc, coshc = shc_coshc(0.5 * w * L / T)
     lam = L * c * shc
     length = sqrt(L * s * L * s + lam * lam)
@@ -337,7 +325,7 @@ def _drawing_point(L, c, s, T, w):
 def drawing_point_tension(Bx, Bz, H, w):
     """Return (T_A, dT_A/dBx, dT_A/dBz, dT_A/dH): tension of the catenary at the drawing point.
 
-    Bx, Bz [m], H [N], w [N/m]; T_A [N]. T_A^2 = H^2 + V_A^2 with V_A of eq. (4).
+    T_A^2 = H^2 + V_A^2 with V_A of eq. (4).
     """
     L = sqrt(Bx * Bx + Bz * Bz)
     c, s = Bx / L, Bz / L
@@ -353,8 +341,7 @@ def drawing_point_tension(Bx, Bz, H, w):
 def run_row(run, EA, Bx, Bz, H, w):
     """Return the derivatives of run / (1 + T_A / EA) with respect to (Bx, Bz, H).
 
-    The unstrained length of the run from drum to eyelet, which stretches with the tension T_A at
-    the drawing point. run, Bx, Bz [m], EA [N], H [N], w [N/m].
+    The unstrained length of the run [m] from drum to eyelet, which stretches with the tension T_A.
     """
     T_A, by_Bx, by_Bz, by_H = drawing_point_tension(Bx, Bz, H, w)
     stretch = 1.0 + T_A / EA
@@ -366,8 +353,8 @@ def run_row(run, EA, Bx, Bz, H, w):
 def horizontal_force_parabola(Bx, Bz, T_A, w):
     """Return (H, slack): horizontal tension from that at the drawing point, by the parabola.
 
-    Slack (1, else 0): T_A [N] is below what the hanging cable needs, and H is the floor w Bx / 20.
-    Bx, Bz [m], w [N/m]; w = 0 gives the straight cable, H = T_A cos(beta0).
+    Slack (1, else 0): T_A is below what the hanging cable needs, and H is the floor w Bx / 20.
+    w = 0 gives the straight cable, H = T_A cos(beta0).
     """
     L = sqrt(Bx * Bx + Bz * Bz)
     c, s = Bx / L, Bz / L
@@ -386,14 +373,15 @@ def horizontal_force_parabola(Bx, Bz, T_A, w):
 def horizontal_force_catenary(Bx, Bz, T_A, w):
     """Return (H, slack): horizontal tension from that at the drawing point, by the catenary.
 
-    Slack (1, else 0): T_A [N] is below what the hanging cable needs, and H is the floor w Bx / 20.
+    Slack (1, else 0): T_A is below what the hanging cable needs, and H is the floor w Bx / 20.
     Newton on the taut branch in the chord tension, of which T_A is a convex function: from above,
-    the iterates fall monotonically to the root. Bx, Bz [m], w [N/m].
+    the iterates fall monotonically to the root.
     """
     L = sqrt(Bx * Bx + Bz * Bz)
     c, s = Bx / L, Bz / L
-    floor = 0.05 * w * L
-    T = T_A + w * L * s if s.real > 0.0 else T_A  # T_B or T_A, both at least T
+    weight = w * L
+    floor = 0.05 * weight
+    T = T_A + weight * s if s.real > 0.0 else T_A  # T_B or T_A, both at least T
     slack = 0
     for _ in range(MAX_NEWTON_STEPS):
         if T.real <= floor.real:
@@ -404,10 +392,11 @@ def horizontal_force_catenary(Bx, Bz, T_A, w):
         if slope.real <= 0.0:
             slack = 1  # past the least T_A: there is no root
             break
-        step = (value - T_A) / slope
+        error = value - T_A
+        step = error / slope
         T = T - step
-        if abs(step.real) <= 1e-13 * T.real:
-            break
+        if abs(step.real) <= 1e-13 * T.real or abs(error.real) <= 1e-15 * (T_A + weight).real:
+            break  # in T, or in T_A where a flat slope leaves T to round-off
     if slack == 1:
         T = floor
     return T * c, slack
