@@ -40,10 +40,10 @@ def CatenaryCableForce_(T: type) -> type:
 
         platform_state (12) is [roll, pitch, yaw, x, y, z, omega, v] of the platform in W, as the
         plant has it; unstrained_length (k) [m] includes the run; platform_wrench (6) is [torque;
-        force] at the platform's origin in W; tangents (3 k) are unit vectors from A to B in W, one
-        cable after the other; dbeta (k) [rad] is the angle from chord to tangent at B (section 6.1).
-        packed (6 + 9 k) holds all of these one after another: all ports share its one solution per state,
-        and a Demultiplexer splits it fast.
+        force] at the platform's origin in W; tangents (3 k) are unit vectors from A to B in W,
+        cable after cable; dbeta (k) [rad] is the angle from chord to tangent at B (section 6.1);
+        packed (6 + 9 k) holds all of these one after another: all ports share its one solution
+        per state, and a Demultiplexer splits it fast.
 
         Args:
             robot: the robot.

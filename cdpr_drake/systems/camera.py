@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 from pydrake.common import RandomDistribution
-from pydrake.common.eigen_geometry import Quaternion_
-from pydrake.math import RigidTransform_, RollPitchYaw_, RotationMatrix_
 from pydrake.systems.framework import LeafSystem_
 
+from cdpr_drake.model.camera import MeasuredPose
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.systems._template import (
     GAUSSIAN_INPUT,
@@ -50,10 +49,8 @@ def CameraMeasurement_(T: type) -> type:
             super().__init__(converter=converter)
             self.robot = robot
             self.calibrated = calibrated if calibrated is not None else robot
-            true, believed = robot.cameras, self.calibrated.cameras
-            self._left = _cast(T, believed.X_WF @ true.X_WF.inverse())
-            self._target = _cast(T, true.X_PM)
-            self._right = _cast(T, believed.X_PM.inverse())
+            true = robot.cameras
+            self._measured = MeasuredPose(robot, self.calibrated)
             self._sigma = np.repeat([true.orientation_noise, true.position_noise], 3)
             self._pose_port = self.DeclareVectorInputPort("pose", 6)
             self._noise_port = self.DeclareVectorInputPort(
@@ -68,30 +65,14 @@ def CameraMeasurement_(T: type) -> type:
         def _calc_pose(self, context: Any, output: Any) -> None:
             pose = self._pose_port.Eval(context)
             noise = self._sigma * optional_input(self._noise_port, context, 6)
-            rpy = RollPitchYaw_[T](pose[:3].astype(_dtype(T)))
-            X_WP = RigidTransform_[T](rpy, pose[3:].astype(_dtype(T)))
-            X = self._left @ X_WP @ self._target @ _small_motion(T, noise) @ self._right
-            measured = RollPitchYaw_[T](X.rotation()).vector()
-            output.SetFromVector(np.concatenate([measured, X.translation()]))
+            z = np.concatenate([value(pose), value(noise)])
+            if T is float:
+                output.SetFromVector(self._measured(z))
+                return
+            measured, jacobian = self._measured.with_jacobian(z)
+            output.SetFromVector(chain(measured, np.split(jacobian, 2, axis=1), pose, noise))
 
     return Impl
-
-
-def _dtype(T: type) -> type:
-    return float if T is float else object
-
-
-def _cast(T: type, X: Any) -> Any:
-    return RigidTransform_[T](X.GetAsMatrix4().astype(_dtype(T)))
-
-
-def _small_motion(T: type, noise: np.ndarray) -> Any:
-    """Return the motion that turns by the vector noise[:3] (rad, small) and shifts by noise[3:]."""
-    half = 0.5 * noise[:3]
-    norm = (1.0 + half.dot(half)) ** 0.5
-    wxyz: np.ndarray = np.concatenate([[1.0 / norm], half / norm]).astype(_dtype(T))
-    rotation = RotationMatrix_[T](Quaternion_[T](wxyz=wxyz))
-    return RigidTransform_[T](rotation, noise[3:].astype(_dtype(T)))
 
 
 @system_template("CableTangentCameras")
