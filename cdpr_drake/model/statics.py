@@ -189,7 +189,10 @@ def bounded_distribution(
     lower, upper, preferred = (
         np.broadcast_to(np.asarray(x, float), (k,)) for x in (lower, upper, preferred)
     )
-    particular = np.linalg.lstsq(A, np.asarray(wrench, float), rcond=None)[0]
+    wrench = np.asarray(wrench, float)
+    particular = np.linalg.lstsq(A, wrench, rcond=None)[0]
+    if np.abs(A @ particular - wrench).max() > RANK_TOLERANCE * np.abs(wrench).max():
+        raise TensionError("no tensions at all balance the wrench: the matrix does not span it")
     _, singular, Vt = np.linalg.svd(A)
     null = Vt[int(np.sum(singular > RANK_TOLERANCE * singular[0])) :].T
     centre = particular + null @ (null.T @ (preferred - particular))
@@ -273,7 +276,8 @@ def distribute(
 
 def _describe(X_WP: RigidTransform) -> str:
     x, y, z = X_WP.translation()
-    roll, pitch, yaw = np.degrees(as_pose(X_WP).rotation().ToRollPitchYaw().vector())
+    angles = np.degrees(as_pose(X_WP).rotation().ToRollPitchYaw().vector())
+    roll, pitch, yaw = np.round(angles, 1) + 0.0  # never "-0.0"
     return (
         f"(x, y, z) = ({x:.2f}, {y:.2f}, {z:.2f}) m, rpy = ({roll:.1f}, {pitch:.1f}, {yaw:.1f}) deg"
     )
