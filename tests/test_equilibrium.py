@@ -371,7 +371,7 @@ def test_lengths_with_a_stiffness_that_depends_on_tension(cogiro: CableRobot) ->
 
 
 def test_the_paper_s_elastic_cable_is_nearly_the_exact_one(cogiro: CableRobot) -> None:
-    """At the same tensions the ECM's spans differ from the robot's own by a fraction of a micron."""
+    """At the same tensions the ECM's spans differ from the robot's own by less than a micron."""
     X = RigidTransform([0.3, -0.2, 1.0])
     rest = rest_state(cogiro, X)
     g = kinematics.cable_geometry(cogiro, X)
