@@ -1,0 +1,47 @@
+"""Telling the user why the first run waits: the kernels are compiled, or there is no compiler."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+from cdpr_drake.commands.terminal import say
+from cdpr_drake.model.kernels import is_compiled
+
+_PREFIX = "cdpr_drake.model.kernels."
+
+
+@contextlib.contextmanager
+def compilation_announced() -> Iterator[None]:
+    """Say so on stderr as soon as numba compiles a kernel inside, rather than load it."""
+    if not is_compiled():
+        say("note: numba is not installed or off; runs take many times longer without it")
+        yield
+        return
+    finished = threading.Event()
+
+    def watch() -> None:
+        while not finished.wait(0.1):
+            if any(sum(kernel.stats.cache_misses.values()) for kernel in _kernels()):
+                say("compiling the kernels, once; this takes up to a minute ...")
+                return
+
+    thread = threading.Thread(target=watch, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        finished.set()
+        thread.join()
+
+
+def _kernels() -> Iterator[Any]:
+    """Yield the compiled functions of the kernel modules imported so far."""
+    for name, module in list(sys.modules.items()):
+        if name.startswith(_PREFIX):
+            for value in list(vars(module).values()):
+                if hasattr(value, "py_func") and hasattr(value, "stats"):
+                    yield value

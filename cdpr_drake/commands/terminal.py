@@ -1,0 +1,161 @@
+"""What goes to the terminal: one-line messages, a progress bar, tables no wider than the screen."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import textwrap
+import time
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, TextIO
+
+from cdpr_drake.model.robot import RobotFileWarning
+
+NAME = "cdpr-drake"
+
+REDRAW_PERIOD = 0.1
+"""Shortest time between two drawings of a progress bar [s]."""
+
+
+def say(message: str) -> None:
+    """Write a `message` on one line of stderr, after the name of the program."""
+    print(f"{NAME}: {' '.join(message.split())}", file=sys.stderr, flush=True)
+
+
+def width_of(stream: TextIO) -> int:
+    """Return how many columns a `stream` shows: COLUMNS, else the terminal's, else 80."""
+    with contextlib.suppress(ValueError, KeyError):
+        if (columns := int(os.environ["COLUMNS"])) > 0:
+            return columns
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        return os.get_terminal_size(stream.fileno()).columns or 80
+    return 80
+
+
+def print_wrapped(text: str, indent: str = "") -> None:
+    """Print a paragraph on stdout, no wider than the screen.
+
+    Args:
+        text: the paragraph.
+        indent: of all its lines but the first.
+    """
+    width = max(width_of(sys.stdout), 20)
+    lines = textwrap.wrap(text, width, subsequent_indent=indent, break_on_hyphens=False)
+    print("\n".join(lines), flush=True)
+
+
+@contextlib.contextmanager
+def warnings_on_one_line() -> Iterator[None]:
+    """Write warnings about robots on one line of stderr each, and each only once."""
+    seen: set[str] = set()
+    with warnings.catch_warnings():
+        others = warnings.showwarning
+
+        def show(message: Any, category: Any, *args: Any, **kwargs: Any) -> None:
+            if not issubclass(category, RobotFileWarning):
+                others(message, category, *args, **kwargs)
+            elif str(message) not in seen:
+                seen.add(str(message))
+                say(f"warning: {message}")
+
+        warnings.simplefilter("always", RobotFileWarning)
+        warnings.showwarning = show
+        yield
+
+
+class Progress:
+    """The progress of one run on stderr: a bar on a terminal, one line at the end elsewhere.
+
+    Args:
+        label: of the run.
+        until: when the run ends [s].
+        label_width: columns the labels of all runs take.
+    """
+
+    def __init__(self, label: str, until: float, label_width: int = 0) -> None:
+        self._label, self._until = label.ljust(label_width), until
+        self._is_terminal = sys.stderr.isatty()
+        self._drawn_at = -REDRAW_PERIOD
+        self._begun = time.monotonic()
+
+    def __call__(self, now: float) -> None:
+        """Show that the run has come to the time `now` [s]."""
+        clock = time.monotonic()
+        if not self._is_terminal or clock - self._drawn_at < REDRAW_PERIOD:
+            return
+        self._drawn_at = clock
+        end = f"{self._until:g}"
+        counter = f"{now:{len(end)}.0f} of {end} s"
+        room = width_of(sys.stderr) - 1 - len(self._label) - len(counter) - 6
+        bar = ""
+        if room >= 5:
+            done = min(int(room * now / self._until), room)
+            bar = f"[{'#' * done}{'.' * (room - done)}]  "
+        self._draw(f"{self._label}  {bar}{counter}")
+
+    def done(self, factor: float) -> None:
+        """Replace the bar by a last line, with how many times real time the run went: `factor`."""
+        took = time.monotonic() - self._begun
+        line = f"{self._label}  {self._until:g} s in {took:.1f} s, {factor:.1f} x real time"
+        self._draw(line)
+        print(file=sys.stderr, flush=True)
+
+    def clear(self) -> None:
+        """Take the bar away."""
+        if self._is_terminal:
+            self._draw("")
+            print(end="\r", file=sys.stderr, flush=True)
+
+    def _draw(self, line: str) -> None:
+        if self._is_terminal:
+            width = width_of(sys.stderr) - 1
+            line = f"\r{line[:width]:<{width}}"
+        print(line, end="", file=sys.stderr, flush=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """A column of a table.
+
+    Attributes:
+        heading: two lines, the second e.g. a unit.
+        cells: one for each row.
+        rank: the higher, the sooner the column is left out on a narrow screen; 0 stays.
+        to_the_left: whether cells are aligned to the left.
+    """
+
+    heading: tuple[str, str]
+    cells: Sequence[str]
+    rank: int = 0
+    to_the_left: bool = False
+
+    @property
+    def width(self) -> int:
+        """Columns of the screen it takes."""
+        return max(map(len, (*self.heading, *self.cells)))
+
+
+def table(columns: Sequence[Column], width: int) -> str:
+    """Return a table as text, leaving out columns until it is no wider than the screen.
+
+    Args:
+        columns: the columns.
+        width: of the screen.
+    """
+    kept = list(columns)
+    while sum(c.width + 2 for c in kept) - 2 > width:
+        least = max(kept, key=lambda c: c.rank)
+        if least.rank == 0:
+            break
+        kept.remove(least)
+    rows = zip(*((*c.heading, *c.cells) for c in kept), strict=True)
+    return "\n".join(
+        "  ".join(
+            f"{cell:{'<' if c.to_the_left else '>'}{c.width}}"
+            for c, cell in zip(kept, row, strict=True)
+        ).rstrip()
+        for row in rows
+    )
