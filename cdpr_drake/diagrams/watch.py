@@ -23,18 +23,15 @@ class LimitWatch:
     """
 
     def __init__(self, robot: CableRobot) -> None:
-        from scipy.spatial import ConvexHull, QhullError
-
         self.slack: dict[int, float] = {}
         points = robot.drawing_points
-        self._normals, self._offsets = np.zeros((0, 2)), np.zeros(0)
+        corners = convex_hull(points[:, :2])
+        edges = np.roll(corners, -1, axis=0) - corners
+        self._normals = np.column_stack([edges[:, 1], -edges[:, 0]])
+        self._offsets = np.sum(self._normals * corners, axis=1)
+        # Fewer than three corners: the drawing points enclose no area to stay within.
+        self._encloses = len(corners) >= 3
         self._top = float(points[:, 2].max())
-        try:
-            equations = ConvexHull(points[:, :2]).equations
-            self._normals, self._offsets = equations[:, :2], equations[:, 2]
-        except QhullError:
-            # Fewer than three drawing points, or all on a line: no area to stay within.
-            self._top = math.inf
         self._slack_tension = robot.weight_per_metre * float(np.ptp(points, axis=0).max()) / 20.0
 
     def check_pose(self, time: float, pose: np.ndarray) -> None:
@@ -49,8 +46,8 @@ class LimitWatch:
             raise SimulationError(
                 "platform pitch", time, f"{math.degrees(pitch):.1f} deg is within 5 deg of 90"
             )
-        outside = self._offsets.size and (self._normals @ pose[3:5] + self._offsets).max() > 0.0
-        if outside or z > self._top:
+        outside = (self._normals @ pose[3:5] > self._offsets).any() or z > self._top
+        if self._encloses and outside:
             raise SimulationError(
                 "platform position",
                 time,
@@ -70,3 +67,24 @@ class LimitWatch:
             )
         for cable in np.flatnonzero(tension < self._slack_tension):
             self.slack.setdefault(int(cable) + 1, time)
+
+
+def convex_hull(points: np.ndarray) -> np.ndarray:
+    """Return the corners (m, 2), counterclockwise, of the convex hull of `points` (n, 2).
+
+    Andrew's monotone chain: worth having here, where importing a library for it takes longer.
+    """
+    ordered = [tuple(p) for p in np.unique(points, axis=0)]
+    corners: list[tuple[float, ...]] = []
+    for chain in (ordered, ordered[::-1]):
+        start = len(corners)
+        for p in chain:
+            while len(corners) >= start + 2 and not _turns_left(corners[-2], corners[-1], p):
+                corners.pop()
+            corners.append(p)
+        corners.pop()
+    return np.array(corners).reshape(-1, 2)
+
+
+def _turns_left(a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, ...]) -> bool:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0

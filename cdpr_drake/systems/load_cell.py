@@ -47,6 +47,7 @@ def LoadCellFilter_(T: type) -> type:
             self._bias = (cells.bias - believed.bias) / believed.gain
             self._sigma = cells.noise / believed.gain
             self._rate = 2.0 * np.pi * cells.cutoff
+            self._drive = self._rate * self._gain, self._rate * self._bias, self._rate * self._sigma
             self._order = cells.order
             k = self._k = robot.num_cables
             state = self.DeclareContinuousState(self._order * k)
@@ -74,12 +75,13 @@ def LoadCellFilter_(T: type) -> type:
 
         def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
             x = context.get_continuous_state_vector().CopyToVector()
-            y = self._gain * self._tension_port.Eval(context) + self._bias
+            gain, bias, sigma = self._drive
+            drive = gain * self._tension_port.Eval(context) + bias
             if self._noise_port.HasValue(context):
-                y = y + self._sigma * self._noise_port.Eval(context)
+                drive += sigma * self._noise_port.Eval(context)
             if self._order > 1:
-                y = np.concatenate([y, x[: -self._k]])
-            derivatives.SetFromVector(self._rate * (y - x))
+                drive = np.concatenate([drive, self._rate * x[: -self._k]])
+            derivatives.SetFromVector(drive - self._rate * x)
 
         def _calc_tension(self, context: Any, output: Any) -> None:
             output.SetFromVector(context.get_continuous_state_vector().CopyToVector()[-self._k :])
