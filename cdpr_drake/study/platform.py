@@ -1,0 +1,159 @@
+"""A robot at rest, linearised by hand: how wrench and tensions change with pose and lengths.
+
+An independent way to the linear model of `make_cable_robot`, without Drake, fast enough for maps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdpr_drake.errors import EquilibriumError
+from cdpr_drake.model.equilibrium import RestState, gravity_wrench
+from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.rotations import skew
+from cdpr_drake.model.winch import WinchModel
+from cdpr_drake.study.state_space import Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RestModel:
+    """First-order changes about a rest, with x = [rotation; translation] of the platform in W.
+
+    Wrenches are [torque; force] at the platform's origin, in W; velocities are [omega; v].
+
+    Attributes:
+        robot: the robot.
+        rest: where it rests.
+        stiffness: (6, 6) dW/dx, cables and weight; negative definite where the rest is stable.
+        damping: (6, 6) dW/d(velocity).
+        wrench_per_length: (6, k) dW/dl [N, N m per m] of total unstrained lengths.
+        wrench_per_rate: (6, k) dW/d(dl/dt).
+        tension: (k, 12 + 2 k) change of the tensions at the drawing points [N] with [x; velocity;
+            lengths; their rates].
+        tangents: (k, 3) unit tangents at the drawing points, from A to B.
+        mass: (6, 6) of platform and payload, at the platform's origin.
+    """
+
+    robot: CableRobot
+    rest: RestState
+    stiffness: Array
+    damping: Array
+    wrench_per_length: Array
+    wrench_per_rate: Array
+    tension: Array
+    tangents: Array
+    mass: Array
+
+    @property
+    def pose_per_length(self) -> Array:
+        """dx/dl (6, k) = -K^-1 dW/dl: how the platform settles when lengths change."""
+        return -np.asarray(np.linalg.solve(self.stiffness, self.wrench_per_length), float)
+
+    def locked(self) -> Array:
+        """Return A (12, 12) of d[x; velocity]/dt with the winches locked: M dv/dt = K x + C v."""
+        A = np.zeros((12, 12))
+        A[:6, 6:] = np.eye(6)
+        A[6:] = np.linalg.solve(self.mass, np.hstack([self.stiffness, self.damping]))
+        return A
+
+    def controlled(self) -> tuple[Array, Array]:
+        """Return A (12 + 3 k, 12 + 3 k), B (12 + 3 k, k) with the winches under their PID.
+
+        State: [x; velocity; motor angles; rates; integrals]; input: desired motor angles [rad].
+        """
+        k = self.robot.num_cables
+        winch = self.robot.winch
+        lengths = np.zeros((2 * k, 12 + 3 * k))  # lengths and rates from the state
+        lengths[:, 12 : 12 + 2 * k] = winch.transmission * np.eye(2 * k)
+        A = np.zeros((12 + 3 * k, 12 + 3 * k))
+        A[:12, :12] = self.locked()
+        push = np.hstack([self.wrench_per_length, self.wrench_per_rate])
+        A[6:12] += np.linalg.solve(self.mass, push) @ lengths
+        tension = self.tension[:, 12:] @ lengths
+        tension[:, :12] += self.tension[:, :12]
+        jacobian = self._winch_jacobian()
+        A[12:, 12:] = jacobian[:, : 3 * k]
+        A[12:] += jacobian[:, 4 * k :] @ tension
+        B = np.zeros((12 + 3 * k, k))
+        B[12:] = jacobian[:, 3 * k : 4 * k]
+        return A, B
+
+    def _winch_jacobian(self) -> Array:
+        """Return (3 k, 5 k): the winches' derivatives with [state; desired angles; tensions]."""
+        k, winch = self.robot.num_cables, self.robot.winch
+        T_A = self.rest.tension_at_drawing_point
+        hold = winch.transmission * T_A
+        integral, desired = np.zeros(k), np.zeros(k)
+        if winch.integral_gain > 0.0:
+            integral = -hold / winch.integral_gain
+        elif winch.proportional_gain > 0.0:
+            desired = -hold / winch.proportional_gain
+        # The angle itself plays no part but in its difference to the desired one.
+        state = np.concatenate([np.zeros(2 * k), integral])
+        return WinchModel(self.robot).with_jacobian(state, desired, T_A)[1][: 3 * k]
+
+
+def rest_model(robot: CableRobot, rest: RestState) -> RestModel:
+    """Return the linear model of a robot about a rest.
+
+    Args:
+        robot: the robot.
+        rest: from `rest_state` or `forward_kinematics`.
+
+    Raises:
+        EquilibriumError: a cable's catenary was not found.
+    """
+    from cdpr_drake.model.kernels.catenary import cable_forces_jacobian
+
+    k, X_WP = robot.num_cables, rest.X_WP
+    R = X_WP.rotation().matrix()
+    EB = robot.attachment_points @ R.T
+    out, jacobian = np.zeros((k, 14)), np.zeros((k, 14, 8))
+    status = cable_forces_jacobian(
+        robot.drawing_points, EB + X_WP.translation(), np.zeros((k, 3)), rest.unstrained_length,
+        np.zeros(k), robot.weight_per_metre, robot.cable.stiffness.as_array(),
+        robot.cable.drum_run, robot.cable.damping_time, out, jacobian,
+    )  # fmt: skip
+    if status:
+        raise EquilibriumError(f"cable {status} has no catenary at this pose and length")
+    arms = skew(EB)
+    motion = np.concatenate([-arms, np.broadcast_to(np.eye(3), (k, 3, 3))], axis=2)
+    to_wrench = np.concatenate([arms, np.broadcast_to(np.eye(3), (k, 3, 3))], axis=1)
+    stiffness = np.einsum("kij,kjl,klm->im", to_wrench, jacobian[:, :3, :3], motion)
+    stiffness[:3, :3] += (skew(out[:, :3]) @ arms).sum(0)
+    EG = R @ robot.center_of_mass
+    stiffness[:3, :3] += skew(gravity_wrench(robot, X_WP)[3:]) @ skew(EG)
+    diagonal = np.arange(k)
+    tension = np.zeros((k, 12 + 2 * k))
+    tension[:, :6] = np.einsum("kj,kjm->km", jacobian[:, 3, :3], motion)
+    tension[:, 6:12] = np.einsum("kj,kjm->km", jacobian[:, 3, 3:6], motion)
+    tension[diagonal, 12 + diagonal] = jacobian[:, 3, 6]
+    tension[diagonal, 12 + k + diagonal] = jacobian[:, 3, 7]
+    return RestModel(
+        robot=robot,
+        rest=rest,
+        stiffness=stiffness,
+        damping=np.einsum("kij,kjl,klm->im", to_wrench, jacobian[:, :3, 3:6], motion),
+        wrench_per_length=np.einsum("kij,kj->ik", to_wrench, jacobian[:, :3, 6]),
+        wrench_per_rate=np.einsum("kij,kj->ik", to_wrench, jacobian[:, :3, 7]),
+        tension=tension,
+        tangents=out[:, 5:8],
+        mass=mass_matrix(robot, R),
+    )
+
+
+def mass_matrix(robot: CableRobot, R_WP: Array) -> Array:
+    """Return (6, 6): momentum [angular; linear] at the platform's origin per [omega; v], in W.
+
+    Args:
+        robot: the robot, for mass, centre of mass and inertia of platform and payload.
+        R_WP: (3, 3) orientation of the platform.
+    """
+    arm = skew(R_WP @ robot.center_of_mass)
+    M = np.zeros((6, 6))
+    M[:3, :3] = R_WP @ robot.inertia @ R_WP.T - robot.mass * arm @ arm
+    M[:3, 3:], M[3:, :3] = robot.mass * arm, -robot.mass * arm
+    M[3:, 3:] = robot.mass * np.eye(3)
+    return M
