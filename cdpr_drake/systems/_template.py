@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -26,14 +27,16 @@ def system_template(name: str) -> Callable[[Callable[[type], type]], Any]:
     def decorate(instantiate: Callable[[type], type]) -> Any:
         def build(T: type) -> type:
             cls = instantiate(T)
-            cls.__name__ = cls.__qualname__ = name if T is float else f"{name}_[AutoDiffXd]"
             parameters = list(inspect.signature(cls._construct).parameters.values())  # type: ignore[attr-defined]
             kept = [p for p in parameters if p.name not in ("self", "converter")]
             cls.__signature__ = inspect.Signature(kept)  # type: ignore[attr-defined]
             return cls
 
-        build.__module__ = instantiate.__module__
-        return TemplateSystem.define(f"{name}_", T_list=(float, AutoDiffXd))(build)
+        scope = sys.modules[instantiate.__module__]
+        template = TemplateSystem.define(f"{name}_", (float, AutoDiffXd), scope=scope)(build)
+        plain = template[float]  # which Drake names by its template and scalar
+        plain.__name__ = plain.__qualname__ = name
+        return template
 
     return decorate
 

@@ -74,6 +74,7 @@ def LoadCellFilter_(T: type) -> type:
             return self._gain * tension_at_winch + self._bias
 
         def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
+            """Write the derivatives of the state in a context."""
             x = context.get_continuous_state_vector().CopyToVector()
             gain, bias, sigma = self._drive
             drive = gain * self._tension_port.Eval(context) + bias

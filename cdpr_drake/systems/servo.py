@@ -187,6 +187,7 @@ def MotorAngleIntegrator_(T: type) -> type:
             Impl._construct(self, other.num_cables, converter=converter)
 
         def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
+            """Write the derivatives of the state in a context."""
             derivatives.SetFromVector(self._rates_port.Eval(context))
 
     return Impl

@@ -87,6 +87,7 @@ def WinchDynamics_(T: type) -> type:
             return chain(y, np.split(jacobian, [3 * k, 4 * k], axis=1), x, desired, tension)
 
         def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
+            """Write the derivatives of the state in a context."""
             x = self._state(context)
             desired, tension = self._desired_port.Eval(context), self._tension_port.Eval(context)
             if T is float:
