@@ -1,0 +1,313 @@
+"""A run as a page that a browser plays without a server: platform, cables, goal, other runs."""
+
+from __future__ import annotations
+
+import logging
+import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydrake.geometry import Cylinder, Meshcat, MeshcatAnimation, MeshcatParams, Rgba
+from pydrake.math import RigidTransform
+
+from cdpr_drake.diagrams import Record
+from cdpr_drake.model.catenary import cable_shape, elastic_catenary
+from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.rotations import as_pose, vector_to_pose
+from cdpr_drake.model.servo import pose_error
+from cdpr_drake.show import scene
+from cdpr_drake.show.overlay import Legend, add_legend
+
+Colour = tuple[float, float, float]
+
+LONGEST_PLAYBACK = 20.0
+"""Longer runs are shown faster, in whole multiples, to last no longer than this [s]."""
+
+SEGMENTS = 8
+"""Straight bars that stand for a cable; the sag of one is 1/64 of the cable's."""
+
+PATH_RADIUS, CABLE_RADIUS = 0.012, 0.025
+"""Of a robot of CoGiRo's size [m]; a cable's own 2 mm could not be seen."""
+
+COLOUR_PERIOD = 5
+"""Frames between two recorded colours; the player interpolates."""
+
+
+def write_replay(
+    path: str | os.PathLike[str],
+    robot: CableRobot,
+    record: Record,
+    goal: RigidTransform | ArrayLike | None = None,
+    *,
+    others: Mapping[str, Record] | None = None,
+    speed: float | None = None,
+    title: str = "Cable robot replay",
+    frames_per_second: int = 10,
+) -> Path:
+    """Write a run as one HTML file, played in a browser without a server or network.
+
+    Cables are elastic catenaries between the recorded ends with the recorded lengths, coloured by
+    the tension at the drawing point. "#t=12.5" at the end of the page's address stops the replay at
+    that time of the run. Frames show recorded states; the player interpolates between them.
+
+    Args:
+        path: of the file, which is replaced if it exists.
+        robot: the true robot.
+        record: the run.
+        goal: X_WP, or [roll, pitch, yaw, x, y, z] (rad, m), drawn as a ghost.
+        others: other runs by label, whose platforms are drawn as ghosts.
+        speed: playback over real time; by default as little as keeps it to 20 s.
+        title: of the page.
+        frames_per_second: recorded frames per second of playback.
+
+    Raises:
+        ValueError: the record lacks a signal, or has no duration.
+        OSError: the file cannot be written.
+    """
+    others = others or {}
+    _check(record, others)
+    pace = default_speed(record.time) if speed is None else speed
+    frames = frame_times(record.time, pace, frames_per_second)
+    index = nearest(record.time, frames)
+    tension = record["tension_at_drawing_point"][index]
+    limits = _nice_range(tension)
+
+    meshcat = _quiet_meshcat()
+    animation = MeshcatAnimation(frames_per_second)
+    animation.set_loop_mode(MeshcatAnimation.LoopMode.kLoopRepeat)
+    animation.set_repetitions(10_000)
+    scene.draw_surroundings(meshcat, robot)
+    entries = _add_run(meshcat, animation, robot, record, index)
+    _animate_colours(animation, _colours(tension, limits))
+    if goal is not None:
+        scene.draw_platform(meshcat, "/goal", robot, scene.GOAL, ghost=True)
+        meshcat.SetTransform("/goal", as_pose(goal))
+        entries.append(("goal", scene.GOAL))
+    for number, (label, other) in enumerate(others.items(), start=1):
+        colour = _add_other(meshcat, animation, robot, other, frames, number)
+        entries.append((label, colour))
+    entries.append(("fixed camera", scene.CAMERA))
+    meshcat.SetAnimation(animation)
+
+    legend = Legend(
+        title=title,
+        subtitle=f"{robot.name}, {robot.num_cables} cables, {robot.mass:g} kg",
+        time=frames,
+        frames_per_second=frames_per_second,
+        speed=pace,
+        tension=tension,
+        tension_range=limits,
+        colours=[_css(c) for c in _colours(np.linspace(*limits, 17), limits)],
+        errors=None if goal is None else _errors(robot, record["pose"][index], goal),
+        entries=[(label, _css(colour)) for label, colour in entries],
+    )
+    file = Path(path)
+    file.write_text(add_legend(meshcat.StaticHtml(), legend), encoding="utf-8")
+    return file
+
+
+def default_speed(time: np.ndarray) -> float:
+    """Return the lowest whole speed at which a run lasts no longer than `LONGEST_PLAYBACK`.
+
+    Args:
+        time: (n,) [s] of the record.
+    """
+    return float(max(1, math.ceil((time[-1] - time[0]) / LONGEST_PLAYBACK - 1e-9)))
+
+
+def frame_times(time: np.ndarray, speed: float, frames_per_second: int) -> np.ndarray:
+    """Return the times of the frames [s], from the first to the last of a record.
+
+    Args:
+        time: (n,) [s] of the record.
+        speed: playback over real time.
+        frames_per_second: of playback.
+
+    Raises:
+        ValueError: a speed or a number of frames that is not positive.
+    """
+    if not (math.isfinite(speed) and speed > 0.0 and frames_per_second > 0):
+        raise ValueError(
+            f"speed and frames per second must be positive, got {speed}, {frames_per_second}"
+        )
+    step = speed / frames_per_second
+    count = math.ceil((time[-1] - time[0]) / step - 1e-9) + 1
+    return np.minimum(time[0] + step * np.arange(count), time[-1])
+
+
+def nearest(time: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Return the indices of the samples nearest to some times.
+
+    Args:
+        time: (n,) [s], rising.
+        wanted: (m,) [s].
+    """
+    right = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
+    return right - (wanted - time[right - 1] < time[right] - wanted)
+
+
+def cable_shapes(
+    robot: CableRobot, poses: np.ndarray, lengths: np.ndarray, points: int = SEGMENTS + 1
+) -> np.ndarray:
+    """Return points (n, k, points, 3) [m] in W along the cables of n states, hanging at rest.
+
+    Args:
+        robot: the robot.
+        poses: (n, 6) [roll, pitch, yaw, x, y, z] (rad, m).
+        lengths: (n, k) [m] unstrained, drum run included.
+        points: number of points on each cable.
+
+    Raises:
+        CableError: a length does not exceed the run from the drum.
+    """
+    w, cable = robot.weight_per_metre, robot.cable
+    shapes = np.empty((len(poses), robot.num_cables, points, 3))
+    for shape, pose, length in zip(shapes, poses, lengths, strict=True):
+        p_WB = (vector_to_pose(pose) @ robot.attachment_points.T).T
+        state = elastic_catenary(
+            p_WB - robot.drawing_points, length, w, cable.stiffness, cable.drum_run
+        )
+        shape[:] = cable_shape(
+            robot.drawing_points,
+            p_WB,
+            state.horizontal_tension,
+            -state.force_on_platform[:, 2],
+            state.unstrained_span_length,
+            w,
+            cable.stiffness(state.tension_at_drawing_point),
+            points,
+        )
+    return shapes
+
+
+def _quiet_meshcat() -> Meshcat:
+    """Return a Meshcat on a free port; nobody is to connect to it, so its address is not logged."""
+    log = logging.getLogger("drake")
+    level = log.level
+    log.setLevel(max(log.getEffectiveLevel(), logging.WARNING))
+    try:
+        return Meshcat(MeshcatParams(host="localhost", port=0))
+    finally:
+        log.setLevel(level)
+
+
+def _check(record: Record, others: Mapping[str, Record]) -> None:
+    for name in ("pose", "unstrained_length", "tension_at_drawing_point"):
+        if name not in record.signals:
+            raise ValueError(f'the record has no signal "{name}", which the replay shows')
+    for label, run in {"the record": record, **others}.items():
+        if "pose" not in run.signals:
+            raise ValueError(f'{label}: no signal "pose", which the replay shows')
+        if len(run.time) < 2:
+            raise ValueError(f"{label}: {len(run.time)} samples, a replay needs two at least")
+
+
+def _add_run(
+    meshcat: Meshcat,
+    animation: MeshcatAnimation,
+    robot: CableRobot,
+    record: Record,
+    index: np.ndarray,
+) -> list[tuple[str, Colour]]:
+    """Draw and animate platform and cables at some samples; return what the legend is to say."""
+    poses = record["pose"]
+    scale = scene.drawing_scale(robot)
+    scene.draw_platform(meshcat, "/run/platform", robot, scene.PLATFORM)
+    _animate_body(animation, "/run/platform", poses[index])
+    scene.draw_path(meshcat, "/run/path", poses[:, 3:], PATH_RADIUS * scale, scene.PLATFORM)
+    shapes = cable_shapes(robot, poses[index], record["unstrained_length"][index])
+    _animate_cables(meshcat, animation, shapes, scale)
+    entries: list[tuple[str, Colour]] = [("platform and its path", scene.PLATFORM)]
+    if robot.payload.mass > 0.0:
+        entries.append((f"payload, {robot.payload.mass:g} kg", scene.PAYLOAD))
+    return entries
+
+
+def _add_other(
+    meshcat: Meshcat,
+    animation: MeshcatAnimation,
+    robot: CableRobot,
+    record: Record,
+    frames: np.ndarray,
+    number: int,
+) -> Colour:
+    """Draw and animate the platform of another run as a ghost, and return its colour."""
+    colour = scene.GHOSTS[(number - 1) % len(scene.GHOSTS)]
+    root, radius = f"/other{number}", PATH_RADIUS * scene.drawing_scale(robot)
+    scene.draw_platform(meshcat, f"{root}/platform", robot, colour, ghost=True, faces=False)
+    poses = record["pose"]
+    _animate_body(animation, f"{root}/platform", poses[nearest(record.time, frames)])
+    scene.draw_path(meshcat, f"{root}/path", poses[:, 3:], radius, colour)
+    return colour
+
+
+def _animate_body(animation: MeshcatAnimation, path: str, poses: np.ndarray) -> None:
+    for frame, pose in enumerate(poses):
+        animation.SetTransform(frame, path, vector_to_pose(pose))
+
+
+def _animate_cables(
+    meshcat: Meshcat, animation: MeshcatAnimation, shapes: np.ndarray, scale: float
+) -> None:
+    """Draw bars of length 1, which the animation places and stretches."""
+    bar = Cylinder(CABLE_RADIUS * scale, 1.0)
+    frames, cables, points, _ = shapes.shape
+    for cable in range(cables):
+        for segment in range(points - 1):
+            path = _segment_path(cable, segment)
+            meshcat.SetObject(path, bar, Rgba(0.5, 0.5, 0.5))
+            for frame in range(frames):
+                X, length = scene.bar_pose(*shapes[frame, cable, segment : segment + 2])
+                animation.SetTransform(frame, path, X)
+                animation.SetProperty(frame, path, "scale", [1.0, 1.0, length])
+
+
+def _animate_colours(animation: MeshcatAnimation, colours: np.ndarray) -> None:
+    """Record colours (n, k, 3) of the cables, at some frames and the last.
+
+    Every track must end at the last frame: each loops by itself.
+    """
+    last = len(colours) - 1
+    # three.js holds colours linear in light, and decodes none that an animation sets.
+    linear = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
+    for frame in sorted({*range(0, last, COLOUR_PERIOD), last}):
+        for cable, colour in enumerate(linear[frame]):
+            for segment in range(SEGMENTS):
+                path = f"{_segment_path(cable, segment)}/<object>"
+                animation.SetProperty(frame, path, "material.color", colour.tolist())
+
+
+def _segment_path(cable: int, segment: int) -> str:
+    return f"/run/cable{cable + 1}/{segment + 1}"
+
+
+def _errors(robot: CableRobot, poses: np.ndarray, goal: RigidTransform | ArrayLike) -> np.ndarray:
+    """Return distance [m] and angle [rad] (n, 2) of the target frame to the goal."""
+    X_PM = robot.cameras.X_PM
+    s = np.array([pose_error(pose, goal, X_PM) for pose in poses])
+    return np.column_stack([np.linalg.norm(s[:, 3:], axis=1), np.linalg.norm(s[:, :3], axis=1)])
+
+
+def _nice_range(tension: np.ndarray) -> tuple[float, float]:
+    """Return limits of a colour scale [N], multiples of 100, of 10 or of 1."""
+    low, high = float(tension.min()), float(tension.max())
+    step = next((s for s in (100.0, 10.0) if high - low > 2.0 * s), 1.0)
+    return step * math.floor(low / step), step * max(
+        math.ceil(high / step), math.floor(low / step) + 1
+    )
+
+
+def _colours(tension: np.ndarray, limits: tuple[float, float]) -> np.ndarray:
+    """Return sRGB colours (..., 3) of tensions: dark blue for low, by purple to orange for high."""
+    from matplotlib import colormaps
+
+    low, high = limits
+    part = np.clip((tension - low) / (high - low), 0.0, 1.0)
+    return colormaps["plasma"](0.85 * part)[..., :3]
+
+
+def _css(colour: ArrayLike) -> str:
+    return "#" + "".join(f"{round(255 * float(c)):02x}" for c in np.asarray(colour))
