@@ -6,8 +6,11 @@ rotation vector is the axis times the angle, the paper's u theta.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 Array = NDArray[np.float64]
@@ -29,12 +32,14 @@ def skew(a: ArrayLike) -> Array:
 
 
 def exp_rotation(rotation_vector: ArrayLike) -> Array:
-    """Return the (3, 3) rotation matrix of a `rotation_vector` (3,) [rad] (Rodrigues' formula)."""
+    """Return the (3, 3) rotation matrix of a `rotation_vector` (3,) [rad]."""
     phi = np.asarray(rotation_vector, float)
-    theta = float(np.linalg.norm(phi))
-    K = skew(phi)
-    half = np.sinc(theta / (2.0 * np.pi))
-    return np.eye(3) + np.sinc(theta / np.pi) * K + 0.5 * half**2 * (K @ K)
+    half = 0.5 * math.sqrt(phi @ phi)
+    xyz = (0.5 * math.sin(half) / half if half > 1e-8 else 0.5) * phi
+    wxyz = np.array([math.cos(half), *xyz])
+    # The quaternion is of unit norm up to round-off, which matters to Drake's check only.
+    matrix: Array = RotationMatrix(Quaternion(wxyz=wxyz / math.sqrt(wxyz @ wxyz))).matrix()
+    return matrix
 
 
 def log_rotation(R: ArrayLike) -> Array:
