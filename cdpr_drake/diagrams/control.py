@@ -263,7 +263,7 @@ def _sample(
         sampler = (
             ZeroOrderHold(sample_time, port.size())
             if delay == 0
-            else DiscreteTimeDelay(sample_time, delay + 1, port.size())
+            else DiscreteTimeDelay(sample_time, delay, port.size())
         )
         builder.AddNamedSystem(f"sampled_{name}", sampler)
         builder.Connect(port, sampler.get_input_port())
