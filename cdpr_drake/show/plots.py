@@ -96,11 +96,10 @@ def error_norm_figure(
             )
         for label, style in run_styles(runs).items():
             axes.plot(runs[label].time, norms[label], linewidth=1.5, **style)
-        axes.set_yscale("log", nonpositive="mask")
-        smallest = min(float(n[n > 0.0].min(initial=np.inf)) for n in norms.values())
-        largest = max(float(n.max()) for n in norms.values())
-        if 0.0 < smallest < largest:
-            axes.set_ylim(0.5 * smallest, 2.0 * largest)
+        positive = np.concatenate([norm[norm > 0.0] for norm in norms.values()])
+        if positive.size:
+            axes.set_yscale("log", nonpositive="mask")
+            axes.set_ylim(0.5 * positive.min(), 2.0 * positive.max())
     panels[0].set_ylabel("norm of the position error [mm]")
     panels[1].set_ylabel("norm of the orientation error [deg]")
     _legend_below(figure, panels[0])
@@ -268,31 +267,20 @@ def _plot_cables(panels: Any, runs: Runs, values: Callable[[Record], np.ndarray]
 
 def _number_cables(axes: Axes) -> None:
     """Write the cables' numbers beside the ends of their lines; the limits must be final."""
+    from matplotlib.lines import Line2D
+
     low, high = axes.get_ylim()
-    right = axes.get_xlim()[1]
+    place = axes.get_yaxis_transform()  # x in widths of the panel, y in data
     lines = [line for line in axes.get_lines() if str(line.get_label()).startswith("cable ")]
     ends = np.array([_last_finite(np.asarray(line.get_ydata(), float)) for line in lines])
     heights = low + (high - low) * spread((ends - low) / (high - low), 0.05)
     for line, end, height in zip(lines, ends, heights, strict=True):
-        axes.annotate(
-            str(line.get_label()).removeprefix("cable "),
-            xy=(right, end),
-            xytext=(1.045, height),
-            textcoords=axes.get_yaxis_transform(),
-            color=line.get_color(),
-            fontsize=9,
-            fontweight="bold",
-            va="center",
-            annotation_clip=False,
-            arrowprops={
-                "arrowstyle": "-",
-                "color": line.get_color(),
-                "linewidth": 0.7,
-                "shrinkA": 1.0,
-                "shrinkB": 0.0,
-                "relpos": (0.0, 0.5),
-            },
-        )
+        leader = Line2D([1.0, 1.04], [end, height], transform=place, clip_on=False)
+        leader.set(color=line.get_color(), linewidth=0.7)
+        axes.add_artist(leader)
+        number = str(line.get_label()).removeprefix("cable ")
+        text = axes.text(1.05, height, number, transform=place, va="center", fontsize=9)
+        text.set(color=line.get_color(), fontweight="bold")
     axes.set_title("cable", loc="right", fontsize=8, color="0.35")
 
 
