@@ -74,7 +74,8 @@ class CableSet:
     def with_jacobian(self, state: Array, length: Array, rate: Array) -> tuple[Array, int, Array]:
         """Return the packed result, the status, and the Jacobian (6 + 9 k, 12 + 2 k).
 
-        The Jacobian is with respect to [state (12); length (k); rate (k)].
+        The Jacobian is with respect to [state (12); length (k); rate (k)]; zeros if the status is
+        not 0.
 
         Args:
             state: (12,) as above.
@@ -83,6 +84,8 @@ class CableSet:
         """
         k = self.num_cables
         packed, status = self(state, length, rate)
+        if status:
+            return packed, status, np.zeros((packed.size, 12 + 2 * k))
         drawing, attachment = self._points
         p_WB, v_WB = np.empty((k, 3)), np.empty((k, 3))
         self._platform.attachment_motion(state, attachment, p_WB, v_WB)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 import sys
 from collections.abc import Callable
 from typing import Any
@@ -10,6 +11,8 @@ from typing import Any
 import numpy as np
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue, InitializeAutoDiff
 from pydrake.systems.scalar_conversion import TemplateSystem
+
+from cdpr_drake.errors import SimulationError
 
 GAUSSIAN_INPUT = "noise"
 
@@ -61,6 +64,25 @@ def chain(y: np.ndarray, jacobians: list[np.ndarray], *args: np.ndarray) -> np.n
         if gradient is not None and gradient.shape[1]:
             total += jacobian @ gradient
     return InitializeAutoDiff(y, total).ravel()
+
+
+def check_finite(plain: np.ndarray, system: Any, context: Any, what: str) -> None:
+    """Raise SimulationError unless all numbers are finite, and below 1e150 in size.
+
+    Every system that takes numbers from outside asks here: a NaN that got into the state would
+    stay there.
+
+    Args:
+        plain: (n,) floats.
+        system: the system that got them.
+        context: its context.
+        what: they are, for the message.
+    """
+    if plain.dot(plain) < math.inf:
+        return
+    time = float(value(np.array([context.get_time()]))[0])
+    numbers = np.array2string(plain, precision=4, threshold=12)
+    raise SimulationError(f"{what} of {system.GetSystemPathname()}", time, f"not finite: {numbers}")
 
 
 def optional_input(port: Any, context: Any, size: int) -> np.ndarray:

@@ -10,7 +10,7 @@ from pydrake.systems.framework import LeafSystem_
 from cdpr_drake.errors import CableError
 from cdpr_drake.model.cables import CableSet, packed_sizes
 from cdpr_drake.model.robot import CableRobot
-from cdpr_drake.systems._template import chain, system_template, value
+from cdpr_drake.systems._template import chain, check_finite, system_template, value
 
 
 @system_template("CatenaryCableForce")
@@ -84,8 +84,10 @@ def CatenaryCableForce_(T: type) -> type:
             else:
                 plain = [value(a) for a in args]
                 packed, status, jacobian = self._cables.with_jacobian(*plain)
-                packed = chain(packed, np.split(jacobian, [12, 12 + self._k], axis=1), *args)
+                if not status:
+                    packed = chain(packed, np.split(jacobian, [12, 12 + self._k], axis=1), *args)
             if status:
+                check_finite(value(args[0]), self, context, "input platform_state")
                 self._raise(context, value(args[1]), value(packed), status)
             output.SetFromVector(packed)
 

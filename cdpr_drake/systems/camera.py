@@ -13,6 +13,7 @@ from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.systems._template import (
     GAUSSIAN_INPUT,
     chain,
+    check_finite,
     optional_input,
     system_template,
     value,
@@ -66,6 +67,7 @@ def CameraMeasurement_(T: type) -> type:
             pose = self._pose_port.Eval(context)
             noise = self._sigma * optional_input(self._noise_port, context, 6)
             z = np.concatenate([value(pose), value(noise)])
+            check_finite(z, self, context, "inputs")
             if T is float:
                 output.SetFromVector(self._measured(z))
                 return
@@ -114,7 +116,9 @@ def CableTangentCameras_(T: type) -> type:
         def _calc_tangents(self, context: Any, output: Any) -> None:
             u = self._tangents_port.Eval(context)
             noise = optional_input(self._noise_port, context, self._size)
-            noisy = (value(u) + self._sigma * value(noise)).reshape(-1, 3)
+            noisy = value(u) + self._sigma * value(noise)
+            check_finite(noisy, self, context, "inputs")
+            noisy = noisy.reshape(-1, 3)
             norm = np.linalg.norm(noisy, axis=1, keepdims=True)
             unit = noisy / norm
             if T is float:

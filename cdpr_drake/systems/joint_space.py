@@ -13,7 +13,7 @@ from cdpr_drake.model.inverse_kinematics import InverseKinematics
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, exp_rotation, pose_to_vector
 from cdpr_drake.model.servo import pose_error, servo_twist
-from cdpr_drake.systems._template import chain, system_template, value
+from cdpr_drake.systems._template import chain, check_finite, system_template, value
 
 
 @system_template("InverseKinematicsAngles")
@@ -60,6 +60,7 @@ def InverseKinematicsAngles_(T: type) -> type:
 
         def _calc_angles(self, context: Any, output: Any) -> None:
             pose = self._pose_port.Eval(context)
+            check_finite(value(pose), self, context, "input desired_pose")
             plain = T is float
             lengths, jacobian = self._inverse.lengths_and_jacobian(value(pose), not plain)
             angles = (lengths - self._zero) / self._transmission

@@ -9,7 +9,7 @@ from pydrake.common import RandomDistribution
 from pydrake.systems.framework import LeafSystem_
 
 from cdpr_drake.model.robot import CableRobot
-from cdpr_drake.systems._template import GAUSSIAN_INPUT, system_template
+from cdpr_drake.systems._template import GAUSSIAN_INPUT, check_finite, system_template, value
 
 
 @system_template("LoadCellFilter")
@@ -80,6 +80,7 @@ def LoadCellFilter_(T: type) -> type:
             drive = gain * self._tension_port.Eval(context) + bias
             if self._noise_port.HasValue(context):
                 drive += sigma * self._noise_port.Eval(context)
+            check_finite(value(drive), self, context, "inputs")
             if self._order > 1:
                 drive = np.concatenate([drive, self._rate * x[: -self._k]])
             derivatives.SetFromVector(drive - self._rate * x)

@@ -9,7 +9,13 @@ from pydrake.systems.framework import LeafSystem_
 
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.servo import MotorRateLaw, PoseErrorMap, ServoSettings
-from cdpr_drake.systems._template import chain, optional_input, system_template, value
+from cdpr_drake.systems._template import (
+    chain,
+    check_finite,
+    optional_input,
+    system_template,
+    value,
+)
 
 
 @system_template("PositionBasedVisualServo")
@@ -90,19 +96,20 @@ def PositionBasedVisualServo_(T: type) -> type:
                 self._tension_port.Eval(context),
                 self._tangents_port.Eval(context),
             )
+            z = np.concatenate([value(a) for a in args])
+            check_finite(z, self, context, "inputs")
             time = context.get_time()
             gain = self.settings.gain_at(time if T is float else time.value())
             if T is float:
-                output.SetFromVector(self._law(np.concatenate(args), gain)[: self._k])
+                output.SetFromVector(self._law(z, gain)[: self._k])
                 return
-            z = np.concatenate([value(a) for a in args])
             y, jacobian = self._law.with_jacobian(z, gain)
             blocks = np.split(jacobian[: self._k], [6, 12, 18, 18 + self._k], axis=1)
             output.SetFromVector(chain(y[: self._k], blocks, *args))
 
         def _calc_error(self, context: Any, output: Any) -> None:
             pose, desired = self._pose_port.Eval(context), self._desired_port.Eval(context)
-            output.SetFromVector(_evaluate_error(T, self._error, pose, desired))
+            output.SetFromVector(_evaluate_error(self, context, pose, desired))
 
     return Impl
 
@@ -142,17 +149,17 @@ def PoseError_(T: type) -> type:
 
         def _calc_error(self, context: Any, output: Any) -> None:
             pose, desired = self._pose_port.Eval(context), self._desired_port.Eval(context)
-            output.SetFromVector(_evaluate_error(T, self._error, pose, desired))
+            output.SetFromVector(_evaluate_error(self, context, pose, desired))
 
     return Impl
 
 
-def _evaluate_error(
-    T: type, error: PoseErrorMap, pose: np.ndarray, desired: np.ndarray
-) -> np.ndarray:
-    if T is float:
-        return error(np.concatenate([pose, desired]))
-    s, jacobian = error.with_jacobian(np.concatenate([value(pose), value(desired)]))
+def _evaluate_error(system: Any, context: Any, pose: np.ndarray, desired: np.ndarray) -> np.ndarray:
+    z = np.concatenate([value(pose), value(desired)])
+    check_finite(z, system, context, "inputs")
+    if pose.dtype == desired.dtype == float:
+        return system._error(z)
+    s, jacobian = system._error.with_jacobian(z)
     return chain(s, np.split(jacobian, 2, axis=1), pose, desired)
 
 
@@ -188,7 +195,9 @@ def MotorAngleIntegrator_(T: type) -> type:
 
         def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
             """Write the derivatives of the state in a context."""
-            derivatives.SetFromVector(self._rates_port.Eval(context))
+            rates = self._rates_port.Eval(context)
+            check_finite(value(rates), self, context, "input motor_rates")
+            derivatives.SetFromVector(rates)
 
     return Impl
 

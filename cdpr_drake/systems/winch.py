@@ -9,7 +9,7 @@ from pydrake.systems.framework import LeafSystem_
 
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.winch import WinchModel
-from cdpr_drake.systems._template import chain, system_template, value
+from cdpr_drake.systems._template import chain, check_finite, system_template, value
 
 
 @system_template("WinchDynamics")
@@ -91,9 +91,11 @@ def WinchDynamics_(T: type) -> type:
             x = self._state(context)
             desired, tension = self._desired_port.Eval(context), self._tension_port.Eval(context)
             if T is float:
-                derivatives.SetFromVector(self._model(x, desired, tension)[0])
+                xdot = self._model(x, desired, tension)[0]
             else:
-                derivatives.SetFromVector(self._evaluate(x, desired, tension)[: 3 * self._k])
+                xdot = self._evaluate(x, desired, tension)[: 3 * self._k]
+            check_finite(value(xdot), self, context, "derivatives")
+            derivatives.SetFromVector(xdot)
 
         def _calc_length(self, context: Any, output: Any) -> None:
             angle = self._state(context)[: self._k]
@@ -111,10 +113,13 @@ def WinchDynamics_(T: type) -> type:
         def _calc_torque(self, context: Any, output: Any) -> None:
             desired = self._desired_port.Eval(context)
             y = self._evaluate(self._state(context), desired, np.zeros(self._k))
-            output.SetFromVector(y[3 * self._k : 4 * self._k])
+            torque = y[3 * self._k : 4 * self._k]
+            check_finite(value(torque), self, context, "motor torque")
+            output.SetFromVector(torque)
 
         def _calc_tension(self, context: Any, output: Any) -> None:
             tension = self._tension_port.Eval(context)
+            check_finite(value(tension), self, context, "input tension_at_drawing_point")
             if self._capstan:
                 tension = self._evaluate(self._state(context), np.zeros(self._k), tension)
             output.SetFromVector(tension[-self._k :])

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from pydrake.systems.framework import LeafSystem_
 
-from cdpr_drake.systems._template import optional_input, system_template
+from cdpr_drake.systems._template import check_finite, optional_input, system_template, value
 
 
 @system_template("ZeroWhenOpen")
@@ -37,7 +37,9 @@ def ZeroWhenOpen_(T: type) -> type:
             Impl._construct(self, other.size, converter=converter)
 
         def _calc(self, context: Any, output: Any) -> None:
-            output.SetFromVector(np.asarray(optional_input(self._port, context, self.size)))
+            u = np.asarray(optional_input(self._port, context, self.size))
+            check_finite(value(u), self, context, "input u")
+            output.SetFromVector(u)
 
     return Impl
 
