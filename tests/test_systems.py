@@ -23,6 +23,7 @@ from system_checks import (
 )
 
 from cdpr_drake import systems
+from cdpr_drake.errors import CableError, SimulationError
 from cdpr_drake.model.equilibrium import rest_state
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.servo import ServoSettings
@@ -339,3 +340,24 @@ def test_a_system_keeps_no_state_of_its_own(cogiro: CableRobot, name: str) -> No
     fresh = fixed_context(system, inputs, state)
     for output, value in before.items():
         np.testing.assert_array_equal(system.GetOutputPort(output).Eval(fresh), value)
+
+
+@EACH_SYSTEM
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")  # uncompiled, of infinities
+def test_a_number_that_is_none_is_refused(cogiro: CableRobot, name: str, bad: float) -> None:
+    """An output or derivative that depends on it raises, naming the system and the time."""
+    plain = make(name, cogiro)
+    for system in (plain, plain.ToAutoDiffXd()):
+        for port, values in usual_inputs(cogiro, name).items():
+            broken = values.copy()
+            broken[1] = bad
+            inputs = usual_inputs(cogiro, name) | {port: broken}
+            context = fixed_context(system, inputs, usual_state(name))
+            context.SetTime(2.5)
+            for output in (o for i, o in FEEDTHROUGH[name] if i == port):
+                with pytest.raises((CableError, SimulationError), match=r"at t = 2\.5 s"):
+                    system.GetOutputPort(output).Eval(context)
+            if name in STATES:
+                with pytest.raises(SimulationError, match=name):
+                    system.EvalTimeDerivatives(context)
