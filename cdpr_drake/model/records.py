@@ -102,6 +102,17 @@ def is_record(kind: Any) -> bool:
     return isinstance(kind, type) and issubclass(kind, Record)
 
 
+def item_type(kind: Any) -> Any:
+    """The type of the items of a field that is a list of any length; None for other fields.
+
+    Args:
+        kind: the type of a field; `tuple[T, ...]` has items of type T.
+    """
+    of = typing.get_args(kind)
+    is_list = typing.get_origin(kind) is tuple and len(of) == 2 and of[1] is Ellipsis
+    return of[0] if is_list else None
+
+
 def one_line(error: Exception) -> str:
     """The message of an error, on one line.
 
@@ -141,8 +152,9 @@ def _convert(value: Any, kind: Any) -> Any:
         return kind(**{kind.shorthand: value})
     if kind is RigidTransform and isinstance(value, RigidTransform):
         return RigidTransform(value)  # Drake's type is mutable: keep our own
-    if kind == tuple[str, ...] and isinstance(value, (list, tuple)):
-        return tuple(value)
+    item = item_type(kind)
+    if item is not None and isinstance(value, (list, tuple)):
+        return tuple(_convert(entry, item) for entry in value)
     if kind == dict[str, str] and isinstance(value, dict):
         return dict(value)
     if isinstance(kind, type) and isinstance(value, kind):

@@ -22,6 +22,7 @@ from cdpr_drake.model.robot_checks import (
     value_problems,
 )
 from cdpr_drake.model.robot_file import read_record, write_record
+from cdpr_drake.model.vision.cameras import Pattern, PoseCamera, StereoPair
 
 
 class RobotFileWarning(UserWarning):
@@ -151,6 +152,8 @@ class Winch(Record):
 class Cameras(Record):
     """What the cameras see, and how well. Noise is Gaussian, one standard deviation.
 
+    Poses of cameras are given in F, so that an error of X_WF, the paper's ^fT_b, moves them all.
+
     Args:
         X_WF: pose of the fixed camera frame F in the world.
         X_PM: pose of the target pattern frame M on the platform.
@@ -159,6 +162,16 @@ class Cameras(Record):
         tangent_noise: [rad], of the measured cable tangents.
         sample_time: [s], between two measurements.
         latency: [s], from exposure to the measurement's use.
+        pose_cameras: those that see the platform; the first is at F.
+        patterns: what they see on it.
+        stereo_pairs: those that see the cables near their drawing points.
+        pixel_noise: [px], white, of each coordinate of a point of a pattern in an image.
+        pixel_bias: [px], as pixel_noise, but fixed for each point of a pattern in each camera.
+        pixel_bias_seed: of the draw of those biases.
+        line_noise: [px], white, of a point on a cable's edge in an image, across the edge.
+        cable_segment: (2,) [m], the stereo pairs see cables from here to there, along the
+            unstrained cable from the drawing point on.
+        edge_points: number of points of an edge that a line is fitted to.
     """
 
     X_WF: RigidTransform
@@ -168,6 +181,15 @@ class Cameras(Record):
     tangent_noise: float
     sample_time: float = 0.05
     latency: float = 0.04
+    pose_cameras: tuple[PoseCamera, ...] = ()
+    patterns: tuple[Pattern, ...] = ()
+    stereo_pairs: tuple[StereoPair, ...] = ()
+    pixel_noise: float = 0.2
+    pixel_bias: float = 0.25
+    pixel_bias_seed: int = 1
+    line_noise: float = 0.2
+    cable_segment: np.ndarray = field(default_factory=lambda: np.array([0.3, 1.0]))
+    edge_points: int = 20
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -180,6 +202,9 @@ class LoadCells(Record):
         gain: (k,) [-], reading over tension; a number stands for all cables.
         cutoff: [Hz], of the filter.
         order: of the filter.
+        vibration_amplitude: [N], of the cables' vibration that the cells feel: its root mean
+            square is that of a sine of this amplitude; 0 is none.
+        vibration_band: (2,) [Hz], lowest and highest frequency of it.
     """
 
     noise: float
@@ -187,6 +212,8 @@ class LoadCells(Record):
     gain: np.ndarray = field(default_factory=lambda: np.array(1.0))
     cutoff: float
     order: int = 1
+    vibration_amplitude: float = 0.0
+    vibration_band: np.ndarray = field(default_factory=lambda: np.array([3.0, 8.0]))
 
 
 def _no_payload() -> RigidBody:

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cdpr_drake.model.vision.cameras import camera_problems
+
 if TYPE_CHECKING:
     from cdpr_drake.model.robot import CableRobot
 
@@ -55,7 +57,11 @@ _NOT_NEGATIVE = (
     "cameras.orientation_noise",
     "cameras.tangent_noise",
     "cameras.latency",
+    "cameras.pixel_noise",
+    "cameras.pixel_bias",
+    "cameras.line_noise",
     "load_cells.noise",
+    "load_cells.vibration_amplitude",
 )
 _FINITE = (
     "drawing_points",
@@ -103,6 +109,11 @@ def value_problems(robot: CableRobot) -> Problems:
     yield from _twins(robot)
     yield from _inertias(robot)
     yield from _cable(robot)
+    yield from camera_problems(robot.cameras)
+    band = robot.load_cells.vibration_band
+    if band.shape != (2,) or not 0.0 < band[0] <= band[1] < np.inf:
+        got = band.tolist()
+        yield "load_cells.vibration_band", f"must be two frequencies, not falling, got {got}"
     for path in robot.sources:
         try:
             attrgetter(path)(robot)

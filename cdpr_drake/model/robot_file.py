@@ -23,7 +23,7 @@ from pydrake.common.yaml import yaml_dump_typed, yaml_load_data, yaml_load_typed
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.model.records import Record, cached, field_types, is_record, one_line
+from cdpr_drake.model.records import Record, cached, field_types, is_record, item_type, one_line
 
 R = TypeVar("R", bound=Record)
 
@@ -63,16 +63,21 @@ def _schema(cls: type[Record]) -> Any:
     members = []
     for field in dataclasses.fields(cls):
         kind = field_types(cls)[field.name]
-        member: Any = kind
-        if kind == tuple[str, ...]:
-            member = list[str]
-        elif kind is RigidTransform:
-            member = _schema(_Pose)
-        elif is_record(kind):
-            member = _schema(kind) | float if kind.shorthand else _schema(kind)
+        member = _member(kind)
         default = functools.partial(_schema_default, field, member)
         members.append((field.name, member, dataclasses.field(default_factory=default)))
     return dataclasses.make_dataclass(cls.__name__, members)
+
+
+def _member(kind: Any) -> Any:
+    item = item_type(kind)
+    if item is not None:
+        return list[_member(item)]  # type: ignore[misc]
+    if kind is RigidTransform:
+        return _schema(_Pose)
+    if is_record(kind):
+        return _schema(kind) | float if kind.shorthand else _schema(kind)
+    return kind
 
 
 def _schema_default(field: Any, member: Any) -> Any:
@@ -90,7 +95,7 @@ def _to_schema(value: Any) -> Any:
     if isinstance(value, Record):
         fields = field_types(type(value))
         return _schema(type(value))(**{f: _to_schema(getattr(value, f)) for f in fields})
-    return list(value) if isinstance(value, tuple) else value
+    return [_to_schema(item) for item in value] if isinstance(value, tuple) else value
 
 
 # Below, errors name a field relative to the value at hand; `_inside` adds the way there.
@@ -101,23 +106,31 @@ def _inside(name: str) -> Iterator[None]:
     try:
         yield
     except RobotFileError as error:
-        field = f"{name}.{error.field}" if error.field else name
+        dot = "." if error.field and not error.field.startswith("[") else ""
+        field = f"{name}{dot}{error.field}"
         raise RobotFileError("", field, error.message) from None
 
 
 def _build(cls: type[R], schema: Any) -> R:
     values = {}
     for name, kind in field_types(cls).items():
-        value = getattr(schema, name)
         with _inside(name):
-            if kind is RigidTransform:
-                value = _build(_Pose, value).transform()
-            elif dataclasses.is_dataclass(value):
-                value = _build(kind, value)
-            elif kind is float:
-                value = float(value)  # YAML 1.1 takes 1e-3 for text
-        values[name] = value
+            values[name] = _build_value(kind, getattr(schema, name))
     return cls(**values)
+
+
+def _build_value(kind: Any, value: Any) -> Any:
+    item, items = item_type(kind), []
+    if item is not None:
+        for index, entry in enumerate(value):
+            with _inside(f"[{index}]"):
+                items.append(_build_value(item, entry))
+        return tuple(items)
+    if kind is RigidTransform:
+        return _build(_Pose, value).transform()
+    if dataclasses.is_dataclass(value):
+        return _build(kind, value)
+    return float(value) if kind is float else value  # YAML 1.1 takes 1e-3 for text
 
 
 def _parse(text: str) -> Any:
@@ -164,9 +177,8 @@ def _inspect(value: Any, kind: Any) -> None:
     elif kind is str:
         if not isinstance(value, str):
             raise RobotFileError("", "", f"must be text, {got}")
-    elif kind == tuple[str, ...]:
-        if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
-            raise RobotFileError("", "", f"must be a list of texts, {got}")
+    elif item_type(kind) is not None:
+        _inspect_items(value, item_type(kind), got)
     elif not isinstance(value, dict) or not all(
         isinstance(item, str) for pair in value.items() for item in pair
     ):
@@ -192,6 +204,15 @@ def _inspect_fields(value: Any, cls: type[Record], got: str) -> None:
                 _inspect(value[field.name], types[field.name])
         elif not optional:
             raise RobotFileError("", field.name, "is missing")
+
+
+def _inspect_items(value: Any, item: Any, got: str) -> None:
+    texts = item is str and isinstance(value, list) and all(isinstance(v, str) for v in value)
+    if not isinstance(value, list) or (item is str and not texts):
+        raise RobotFileError("", "", f"must be a list{' of texts' if item is str else ''}, {got}")
+    for index, entry in enumerate(value):
+        with _inside(f"[{index}]"):
+            _inspect(entry, item)
 
 
 def _inspect_array(value: Any, got: str) -> None:
