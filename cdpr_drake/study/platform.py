@@ -33,6 +33,7 @@ class RestModel:
         tension: (k, 12 + 2 k) change of the tensions at the drawing points [N] with [x; velocity;
             lengths; their rates].
         tangents: (k, 3) unit tangents at the drawing points, from A to B.
+        dbeta: (k,) [rad] angle from chord to cable at the attachment points.
         mass: (6, 6) of platform and payload, at the platform's origin.
     """
 
@@ -44,6 +45,7 @@ class RestModel:
     wrench_per_rate: Array
     tension: Array
     tangents: Array
+    dbeta: Array
     mass: Array
 
     @property
@@ -140,6 +142,7 @@ def rest_model(robot: CableRobot, rest: RestState) -> RestModel:
         wrench_per_rate=np.einsum("kij,kj->ik", to_wrench, jacobian[:, :3, 7]),
         tension=tension,
         tangents=out[:, 5:8],
+        dbeta=out[:, 11],
         mass=mass_matrix(robot, R),
     )
 

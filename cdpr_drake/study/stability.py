@@ -2,7 +2,7 @@
 
 Near its goal the sampled loop is x' = A x + B D_m a (platform, winches; a (6) the commanded motion
 of the target frame, in itself), a' = u, with u = lambda s held from k T + latency on, s the error
-seen at k T. The directions of internal tension, which the law never commands, are left out: they are
+seen at k T. The directions of internal tension, never commanded by the law, are left out: they are
 neutral whatever the gain. Exponentials of A are taken once a latency; each gain after that is a
 product of small matrices and its eigenvalues.
 """
