@@ -31,7 +31,8 @@ LAYERS = {
     "study": 4,
     "experiments": 5,
     "show": 5,
-    "__main__": 6,
+    "commands": 6,
+    "__main__": 7,
 }
 HEAVY = ("cv2", "scipy.optimize", "matplotlib", "numba")
 

@@ -8,15 +8,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-import cdpr_drake
+from cdpr_drake import __version__
 
-EPILOG = """\
-exit status:
-  0  done
-  1  a run left what the model covers, or results could not be written
-  2  the input cannot be used; nothing was run
-  130  interrupted
-"""
+EPILOG = (
+    "Exit status: 0, done; 1, a run left what the model covers, or results could not be written; "
+    "2, the input cannot be used, and nothing was run; 130, interrupted."
+)
 
 
 class UsageError(Exception):
@@ -87,10 +84,9 @@ def _build_parser() -> argparse.ArgumentParser:
         prog="cdpr-drake",
         description="Vision-based control of cable-driven parallel robots with sagging cables.",
         epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    parser.add_argument("--version", action="version", version=f"%(prog)s {cdpr_drake.__version__}")
+    parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
     _add_run(commands)
     commands.add_parser(
@@ -113,7 +109,6 @@ def _add_run(commands: argparse._SubParsersAction[_Parser]) -> None:
             "on CoGiRo, with VBC on sagging (SCMWE) and on straight cables (SLSM), and with JSC."
         ),
         epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
     what = run.add_argument_group("what moves, and where")

@@ -18,7 +18,7 @@ _PREFIX = "cdpr_drake.model.kernels."
 def compilation_announced() -> Iterator[None]:
     """Say so on stderr as soon as numba compiles a kernel inside, rather than load it."""
     if not is_compiled():
-        say("note: numba is not installed or off; runs take many times longer without it")
+        say("note: numba is not installed or off; runs take several times longer without it")
         yield
         return
     finished = threading.Event()

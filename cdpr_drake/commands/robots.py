@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 
-from cdpr_drake.commands.terminal import Column, print_wrapped, table, width_of
+from cdpr_drake.commands.terminal import Column, fitting, print_wrapped, table, width_of
 from cdpr_drake.model.robot import load_robot, robot_names
 
 
@@ -24,7 +24,7 @@ def list_robots() -> int:
         Column(heading=("mass", "[kg]"), cells=[f"{r.mass:.0f}" for r in robots], rank=1),
         Column(heading=("cables", ""), cells=[str(r.num_cables) for r in robots], rank=2),
     ]
-    print(table(columns, width_of(sys.stdout)))
+    print(table(fitting(columns, width_of(sys.stdout))))
     print()
     for robot in robots:
         print_wrapped(f"{robot.name}: {robot.description}", indent="    ")

@@ -125,12 +125,14 @@ class Column:
         cells: one for each row.
         rank: the higher, the sooner the column is left out on a narrow screen; 0 stays.
         to_the_left: whether cells are aligned to the left.
+        meaning: a sentence on it, for below the table.
     """
 
     heading: tuple[str, str]
     cells: Sequence[str]
     rank: int = 0
     to_the_left: bool = False
+    meaning: str = ""
 
     @property
     def width(self) -> int:
@@ -138,8 +140,8 @@ class Column:
         return max(map(len, (*self.heading, *self.cells)))
 
 
-def table(columns: Sequence[Column], width: int) -> str:
-    """Return a table as text, leaving out columns until it is no wider than the screen.
+def fitting(columns: Sequence[Column], width: int) -> list[Column]:
+    """Return the columns without those that a table no wider than the screen has to leave out.
 
     Args:
         columns: the columns.
@@ -151,11 +153,20 @@ def table(columns: Sequence[Column], width: int) -> str:
         if least.rank == 0:
             break
         kept.remove(least)
-    rows = zip(*((*c.heading, *c.cells) for c in kept), strict=True)
+    return kept
+
+
+def table(columns: Sequence[Column]) -> str:
+    """Return a table as text.
+
+    Args:
+        columns: the columns.
+    """
+    rows = zip(*((*c.heading, *c.cells) for c in columns), strict=True)
     return "\n".join(
         "  ".join(
             f"{cell:{'<' if c.to_the_left else '>'}{c.width}}"
-            for c, cell in zip(kept, row, strict=True)
+            for c, cell in zip(columns, row, strict=True)
         ).rstrip()
         for row in rows
     )

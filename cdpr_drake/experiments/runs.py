@@ -97,6 +97,13 @@ class Setup:
                 raise ValueError(f"{name} must be positive and finite, got {value}")
         if not (math.isfinite(self.ramp_time) and self.ramp_time >= 0.0):
             raise ValueError(f"the ramp time must not be negative, got {self.ramp_time} s")
+        if self.until < RECORD_PERIOD:
+            raise ValueError(f"a run takes at least {RECORD_PERIOD} s, got {self.until} s")
+        if not 0.0 <= self.latency < self.until:
+            raise ValueError(
+                f"the latency must be from 0 to below the run's {self.until:g} s, "
+                f"got {self.latency} s"
+            )
         if not 0 <= self.seed < 2**32:
             raise ValueError(f"the seed must be from 0 to 2^32 - 1, got {self.seed}")
 

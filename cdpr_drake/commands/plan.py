@@ -1,0 +1,113 @@
+"""What `cdpr-drake run` is asked to do: options to setups of runs, and a word on them."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from cdpr_drake.commands.terminal import say
+from cdpr_drake.experiments import Prepared, Setup, paper_test
+from cdpr_drake.experiments.moves import move_near_the_middle
+from cdpr_drake.experiments.paper_tests import paper_tests
+from cdpr_drake.model.cable_models import CABLE_MODELS
+from cdpr_drake.model.robot import load_robot
+from cdpr_drake.model.servo import pose_error
+
+DEFAULT_TEST = 4
+DEFAULT_MODELS = ("SCMWE", "SLSM")
+
+
+def plan(options: argparse.Namespace) -> tuple[str, list[Setup]]:
+    """Return a name for what the options ask for, and the setups of its runs.
+
+    Args:
+        options: the parsed arguments.
+
+    Raises:
+        CdprError, ValueError: they cannot be used.
+    """
+    robot = load_robot(options.robot if options.robot is not None else paper_tests().robot)
+    number = options.test
+    if number is None and robot.name == paper_tests().robot:
+        number = DEFAULT_TEST
+    values: dict[str, Any] = {
+        "sample_time": robot.cameras.sample_time,
+        "latency": robot.cameras.latency,
+        "noise": not options.no_noise,
+        "seed": options.seed,
+    }
+    if number is not None:
+        test = paper_test(number)
+        robot = test.carried_by(robot) if options.payload is None else robot
+        values["start"], values["goal"] = test.poses(robot)
+        values["gain"], values["until"] = test.gain, test.duration
+    else:
+        values["start"], values["goal"] = move_near_the_middle(robot)
+    if options.payload is not None:
+        if not (math.isfinite(options.payload) and options.payload >= 0.0):
+            raise ValueError(f"the payload must be >= 0 and finite, got {options.payload:g} kg")
+        robot = robot.with_payload(options.payload)
+    for field in ("start", "goal", "gain", "latency", "sample_time", "until"):
+        given = getattr(options, field)
+        if given is not None:
+            values[field] = given
+    if values["sample_time"] == 0.0:
+        values["sample_time"] = None
+
+    setups = []
+    if options.controller in ("vbc", "both"):
+        models = dict.fromkeys(options.cable_model or DEFAULT_MODELS)
+        setups += [Setup(robot=robot, cable_model=m, **values) for m in models]
+    elif options.cable_model:
+        known = ", ".join(CABLE_MODELS)
+        raise ValueError(f"--cable-model ({known}) is VBC's; it has no meaning with JSC alone")
+    if options.controller in ("jsc", "both"):
+        setups.append(Setup(robot=robot, controller="JSC", **values))
+    is_test = number is not None and options.start is None and options.goal is None
+    name = f"test-{number}" if is_test else re.sub(r"[^\w.-]+", "-", robot.name).strip(".-")
+    return name or "run", setups
+
+
+def warn_of_low_tensions(ready: Sequence[Prepared]) -> None:
+    """Warn on stderr of runs that start with a cable below the robot's lower tension limit.
+
+    Args:
+        ready: the runs.
+    """
+    said: dict[str, list[str]] = {}
+    for prepared in ready:
+        tension = prepared.tension_at_drawing_point()
+        cable = int(np.argmin(tension))
+        limit = prepared.setup.robot.cable.min_tension
+        if tension[cable] < limit:
+            text = (
+                f"with cable {cable + 1} at {tension[cable]:.0f} N, below the robot's {limit:g} N"
+            )
+            said.setdefault(text, []).append(prepared.setup.label)
+    for text, labels in said.items():
+        say(f"warning: {', '.join(labels)}: starts {text}")
+
+
+def describe(name: str, setup: Setup) -> str:
+    """Return in words what the runs have in common.
+
+    Args:
+        name: of what is run.
+        setup: of one of the runs.
+    """
+    s = pose_error(setup.start, setup.goal, setup.robot.cameras.X_PM)
+    turn, way = np.degrees(np.linalg.norm(s[:3])), np.linalg.norm(s[3:])
+    what = f"Test {name[5:]} of the paper" if name.startswith("test-") else "A move"
+    loop = "a continuous loop"
+    if setup.sample_time is not None:
+        loop = f"{1.0 / setup.sample_time:g} Hz with {1e3 * setup.latency:g} ms of latency"
+    noise = f"noise with seed {setup.seed}" if setup.noise else "no noise"
+    return (
+        f"{what} on {setup.robot.name}, {setup.robot.mass:g} kg: {way:.2f} m and {turn:.1f} deg in "
+        f"{setup.until:g} s, lambda = {setup.gain:g} 1/s, {loop}, {noise}."
+    )

@@ -1,0 +1,110 @@
+"""What `cdpr-drake run` tells of its runs: a table, and a summary for other programs."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from cdpr_drake import __version__
+from cdpr_drake.commands.terminal import Column, fitting, print_wrapped, table, width_of
+from cdpr_drake.experiments import Run, Setup
+
+
+def summarize(name: str, setup: Setup, runs: Sequence[Run]) -> dict[str, Any]:
+    """Return what the runs had in common and what came of each, as plain values.
+
+    Args:
+        name: of what was run.
+        setup: of one of the runs.
+        runs: all of them.
+    """
+
+    def pose(X: Any) -> list[float]:
+        angles = np.degrees(X.rotation().ToRollPitchYaw().vector())
+        return [*X.translation().tolist(), *angles.tolist()]
+
+    return {
+        "name": name,
+        "cdpr_drake": __version__,
+        "drake": version("drake"),
+        "robot": setup.robot.name,
+        "mass_kg": setup.robot.mass,
+        "payload_kg": setup.robot.payload.mass,
+        "start_x_y_z_m_roll_pitch_yaw_deg": pose(setup.start),
+        "goal_x_y_z_m_roll_pitch_yaw_deg": pose(setup.goal),
+        "gain_per_s": setup.gain,
+        "sample_time_s": setup.sample_time,
+        "latency_s": setup.latency,
+        "noise": setup.noise,
+        "seed": setup.seed,
+        "runs": {r.setup.label: _outcome(r) for r in runs},
+    }
+
+
+def _outcome(result: Run) -> dict[str, Any]:
+    setup = result.setup
+    head = {"controller": setup.controller, "cable_model": setup.cable_model}
+    return {**head, **result.summary.to_dict()}
+
+
+def print_results(runs: Sequence[Run]) -> None:
+    """Print a table of the runs, and what needs a word besides, on stdout.
+
+    Args:
+        runs: the runs.
+    """
+    columns = fitting(_columns(runs), width_of(sys.stdout))
+    print()
+    print(table(columns))
+    print()
+    print_wrapped(" ".join(column.meaning for column in columns if column.meaning))
+    for r in runs:
+        for cable, time in sorted(r.summary.slack_cables.items()):
+            print_wrapped(f"{r.setup.label}: cable {cable} went slack at {time:.1f} s.")
+
+
+def _columns(runs: Sequence[Run]) -> list[Column]:
+    results = [r.summary for r in runs]
+
+    def cells(attribute: str, digits: int) -> list[str]:
+        values = [getattr(summary, attribute) for summary in results]
+        return ["-" if value is None else f"{value:.{digits}f}" for value in values]
+
+    return [
+        Column(heading=("", "run"), cells=[r.setup.label for r in runs], to_the_left=True),
+        Column(
+            heading=("final", "mm"),
+            cells=cells("position_error", 1),
+            meaning="Final error: true pose against the goal, mean of the last second.",
+        ),
+        Column(heading=("error", "deg"), cells=cells("orientation_error", 3)),
+        Column(
+            heading=("seen", "mm"),
+            cells=cells("position_error_seen", 1),
+            rank=4,
+            meaning="Seen: the same as the controller measures it.",
+        ),
+        Column(heading=("", "deg"), cells=cells("orientation_error_seen", 3), rank=5),
+        Column(
+            heading=("to 2 %", "s"),
+            cells=cells("settled_after", 1),
+            meaning="To 2 %: when the position error fell below 2 % of the first to stay.",
+        ),
+        Column(
+            heading=("strays", "mm"),
+            cells=cells("position_excursion", 1),
+            rank=1,
+            meaning="Strays: farthest from the straight way to the goal.",
+        ),
+        Column(heading=("", "deg"), cells=cells("orientation_excursion", 2), rank=3),
+        Column(
+            heading=("tension", "N"),
+            cells=[f"{s.lowest_tension:.0f}-{s.highest_tension:.0f}" for s in results],
+            rank=2,
+            meaning="Tension: lowest and highest at the drawing points.",
+        ),
+    ]
