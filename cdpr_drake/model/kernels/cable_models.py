@@ -31,6 +31,7 @@ MAX_NEWTON_STEPS = 60  # 2 to 4 when taut; up to 20 where the branches meet and 
 
 
 def _python_sqrt(x):
+    """Return the square root of a float or complex x."""
     return cmath.sqrt(x) if isinstance(x, complex) else math.sqrt(x)
 
 

@@ -1,8 +1,8 @@
 """A measured pose: calibration error, noise, and back to roll, pitch and yaw, in real or complex.
 
-Arguments: y, x: numbers; z (12,) = [pose (6); noise (6)], the pose [roll, pitch, yaw, x, y, z], the
-noise [rotation; translation] in the target frame; left, target, right (4, 3): rotations over
-translations of the constant transforms; out (6,) and jacobian (6, 12): results.
+Arguments: y, x: numbers; A, B: transforms (4, 3), rotation over translation; z (12,) = [pose (6);
+noise (6)], the pose [roll, pitch, yaw, x, y, z], the noise [rotation; translation] in the target
+frame; left, target, right (4, 3): the constant transforms; out (6,) and jacobian (6, 12): results.
 """
 
 from __future__ import annotations
