@@ -83,6 +83,7 @@ def make_simulator(
     config = SimulatorConfig()
     config.integration_scheme = "runge_kutta3"
     config.max_step_size = max_step
+    config.start_time = context.get_time()  # which applying the configuration would set to 0
     config.use_error_control = accuracy is not None
     if accuracy is not None:
         config.accuracy = accuracy
