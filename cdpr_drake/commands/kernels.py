@@ -16,10 +16,13 @@ _PREFIX = "cdpr_drake.model.kernels."
 
 @contextlib.contextmanager
 def compilation_announced() -> Iterator[None]:
-    """Say so on stderr as soon as numba compiles a kernel inside, rather than load it."""
+    """Say so on stderr as soon as numba compiles a kernel inside, rather than load it.
+
+    Where there is no numba, say that at the end, unless an exception leaves the block.
+    """
     if not is_compiled():
-        say("note: numba is not installed or off; runs take several times longer without it")
         yield
+        say("note: numba is not installed or off; runs take several times longer without it")
         return
     finished = threading.Event()
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from cdpr_drake.diagrams.simulation import Record
 from cdpr_drake.model.rotations import Array
+from cdpr_drake.study.response import excursion
 
 FINAL_WINDOW = 1.0
 """Final errors are means over the last second of a run, as long as a run lasts that long [s]."""
@@ -37,8 +38,11 @@ class Summary:
             [s]; None if it has not.
         within_tolerance_after: when the true errors have come below 10 mm and 0.5 deg to stay [s];
             None if they have not.
-        position_excursion: how far s_t strays from the straight way [mm], see `excursion`.
-        orientation_excursion: how far s_w strays from the straight way [deg].
+        position_excursion: largest distance of s_t from the segment between s_t(0) and 0 [mm]. The
+            ideal law keeps to it, s(t) = c(t) s(0) with c falling from 1 to 0 (eq. 18); motion to
+            the side, beyond the goal (overshoot) and backwards at the start all count, and no
+            component of s overshoots by more.
+        orientation_excursion: the same of s_w [deg].
         lowest_tension: over all cables and the whole run, at the drawing points [N].
         lowest_tension_cable: the cable it is in, counting from 1.
         highest_tension: over all cables and the whole run, at the drawing points [N].
@@ -117,22 +121,6 @@ def settling_time(time: Array, is_settled: Array) -> float | None:
     return float(time[first]) if first < time.size else None
 
 
-def excursion(error: Array) -> float:
-    """Return how far an error strays from the straight way: the largest distance from [0, s(0)].
-
-    The ideal law makes s(t) = c(t) s(0) with c falling from 1 to 0 (eq. 18), so that s keeps to the
-    straight segment from s(0) to 0. The distance from it counts any motion to the side, beyond the
-    goal (overshoot) and backwards at the start; no component of s overshoots by more.
-
-    Args:
-        error: (n, 3) s_t [m] or s_w [rad] over time.
-    """
-    first = error[0]
-    square = float(first @ first)
-    along = np.clip(error @ first / square, 0.0, 1.0) if square > 0.0 else np.zeros(len(error))
-    return float(np.linalg.norm(error - along[:, None] * first, axis=1).max())
-
-
 def summarize(record: Record, offset: Array) -> Summary:
     """Return the summary of a run.
 
@@ -147,6 +135,7 @@ def summarize(record: Record, offset: Array) -> Summary:
     seen: tuple[float | None, float | None] = (None, None)
     if "pose_error_seen" in record.signals:
         seen = final_errors(time, record["pose_error_seen"])
+    straying = excursion(error)
     x, y, z = (1e3 * offset[time >= time[-1] - FINAL_WINDOW].mean(axis=0)).tolist()
     tension = record["tension_at_drawing_point"]
     low, high = tension.min(axis=0), tension.max(axis=0)
@@ -160,8 +149,8 @@ def summarize(record: Record, offset: Array) -> Summary:
         within_tolerance_after=settling_time(
             time, (size[:, 1] < TOLERANCE[0]) & (size[:, 0] < TOLERANCE[1])
         ),
-        position_excursion=1e3 * excursion(error[:, 3:]),
-        orientation_excursion=float(np.degrees(excursion(error[:, :3]))),
+        position_excursion=1e3 * straying[0],
+        orientation_excursion=float(np.degrees(straying[1])),
         lowest_tension=float(low.min()),
         lowest_tension_cable=int(low.argmin()) + 1,
         highest_tension=float(high.max()),
