@@ -32,7 +32,9 @@ class LimitWatch:
         # Fewer than three corners: the drawing points enclose no area to stay within.
         self._encloses = len(corners) >= 3
         self._top = float(points[:, 2].max())
-        self._slack_tension = robot.weight_per_metre * float(np.ptp(points, axis=0).max()) / 20.0
+        # A slack cable still bears its own weight at the drawing point, so tension never comes near
+        # zero there: slack is less than the weight of a cable as long as the frame.
+        self._slack_tension = robot.weight_per_metre * float(np.ptp(points, axis=0).max())
 
     def check_pose(self, time: float, pose: np.ndarray) -> None:
         """Raise SimulationError where a `pose` (6,) at a `time` [s] leaves what the model covers.
@@ -56,6 +58,8 @@ class LimitWatch:
 
     def check_tensions(self, time: float, tension: np.ndarray) -> None:
         """Note the cables whose `tension` (k,) [N] at the drawing point says slack, and the `time`.
+
+        Slack is a tension below the weight of a cable as long as the frame: a sag of an eighth.
 
         Raises:
             SimulationError: a tension is not finite.
