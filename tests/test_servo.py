@@ -205,15 +205,16 @@ def test_only_the_straight_line_needs_no_tensions(cogiro: CableRobot) -> None:
 # --- the whole law
 
 
-def few_cables(robot: CableRobot, k: int) -> CableRobot:
-    """Return the robot with only its first k cables."""
+def few_cables(robot: CableRobot, cables: int | list[int]) -> CableRobot:
+    """Return the robot with only its first cables, or those of given indices."""
+    chosen = list(range(cables)) if isinstance(cables, int) else cables
     cells, cable, winch = robot.load_cells, robot.cable, robot.winch
     return robot.replace(
-        drawing_points=robot.drawing_points[:k],
-        attachment_points=robot.attachment_points[:k],
-        cable=cable.replace(drum_run=cable.drum_run[:k]),
-        winch=winch.replace(encoder_zero_length=winch.encoder_zero_length[:k]),
-        load_cells=cells.replace(bias=cells.bias[:k], gain=cells.gain[:k]),
+        drawing_points=robot.drawing_points[chosen],
+        attachment_points=robot.attachment_points[chosen],
+        cable=cable.replace(drum_run=cable.drum_run[chosen]),
+        winch=winch.replace(encoder_zero_length=winch.encoder_zero_length[chosen]),
+        load_cells=cells.replace(bias=cells.bias[chosen], gain=cells.gain[chosen]),
     )
 
 
