@@ -67,7 +67,7 @@ def cable_model_index(model: str) -> int:
         ValueError: an unknown model; the message names the known ones.
     """
     if model not in CABLE_MODELS:
-        raise ValueError(f"unknown cable model {model!r}; known are {', '.join(CABLE_MODELS)}")
+        raise ValueError(f'unknown cable model "{model}"; known are {", ".join(CABLE_MODELS)}')
     return CABLE_MODELS.index(model)
 
 

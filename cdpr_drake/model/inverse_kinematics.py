@@ -7,9 +7,10 @@ from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import GeometryError, TensionError
-from cdpr_drake.model.cable_models import CABLE_MODELS
+from cdpr_drake.model.cable_models import cable_model_index
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, as_pose, pose_to_vector
+from cdpr_drake.model.servo import law_body
 
 
 class InverseKinematics:
@@ -30,20 +31,14 @@ class InverseKinematics:
     def __init__(self, robot: CableRobot, cable_model: str = "SCMWE", order: int = 4) -> None:
         from cdpr_drake.model.kernels import inverse as kernel
 
-        if cable_model not in CABLE_MODELS:
-            known = ", ".join(CABLE_MODELS)
-            raise ValueError(f'unknown cable model "{cable_model}"; known are {known}')
         self.robot, self._kernel = robot, kernel
-        body = np.concatenate(
-            [[robot.mass * robot.gravity], robot.center_of_mass, [robot.weight_per_metre]]
-        )
-        self._head = (CABLE_MODELS.index(cable_model), order)
+        self._head = (cable_model_index(cable_model), order)
         self._robot_arrays = tuple(
             np.ascontiguousarray(a, float)
             for a in (
                 robot.drawing_points,
                 robot.attachment_points,
-                body,
+                law_body(robot),
                 robot.cable.stiffness.as_array(),
             )
         )

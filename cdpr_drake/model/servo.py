@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import GeometryError
-from cdpr_drake.model.cable_models import CABLE_MODELS
+from cdpr_drake.model.cable_models import cable_angles, cable_model_index
 from cdpr_drake.model.kinematics import D_t, cable_geometry
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import (
@@ -94,9 +94,7 @@ class ServoSettings:
     model_drum_run: bool = False
 
     def __post_init__(self) -> None:
-        if self.cable_model not in CABLE_MODELS:
-            known = ", ".join(CABLE_MODELS)
-            raise ValueError(f'unknown cable model "{self.cable_model}"; known are {known}')
+        cable_model_index(self.cable_model)  # refuses an unknown one
         if not (np.isfinite(self.gain) and self.gain > 0.0):
             raise ValueError(f"the gain must be positive and finite, got {self.gain} 1/s")
         if not (np.isfinite(self.ramp_time) and self.ramp_time >= 0.0):
@@ -111,6 +109,16 @@ class ServoSettings:
         if time >= self.ramp_time:
             return self.gain
         return self.gain * max(time, 0.0) / self.ramp_time
+
+
+def law_body(robot: CableRobot) -> Array:
+    """Return [m g, x_G, y_G, z_G, w] (5,), weight [N], p_PG [m] and cable weight [N/m].
+
+    Args:
+        robot: the robot as the controller knows it.
+    """
+    weight = robot.mass * robot.gravity
+    return np.array([weight, *robot.center_of_mass, robot.weight_per_metre])
 
 
 class MotorRateLaw:
@@ -136,12 +144,10 @@ class MotorRateLaw:
         self._kernel = kernel
         self._transmission = robot.winch.transmission
         run = robot.cable.drum_run if settings.model_drum_run else np.zeros(robot.num_cables)
-        body = np.concatenate(
-            [[robot.mass * robot.gravity], robot.center_of_mass, [robot.weight_per_metre]]
-        )
+        body = law_body(robot)
         X_PM = robot.cameras.X_PM
         target = np.vstack([X_PM.rotation().matrix(), X_PM.translation()])
-        self._head = (CABLE_MODELS.index(settings.cable_model), settings.order)
+        self._head = (cable_model_index(settings.cable_model), settings.order)
         self._limits = np.array([settings.max_speed, settings.max_angular_speed])
         self._robot_arrays = tuple(
             np.ascontiguousarray(a, float)
@@ -259,16 +265,18 @@ def D_a(
     X_WP = as_pose(pose)
     k = robot.num_cables
     R = np.ascontiguousarray(X_WP.rotation().matrix())
-    body = np.concatenate(
-        [[robot.mass * robot.gravity], robot.center_of_mass, [robot.weight_per_metre]]
-    )
+    body = law_body(robot)
     run = np.asarray(robot.cable.drum_run if model_drum_run else np.zeros(k), float)
+    # The kernel takes what the sensors give, tension and elevation at A: find them from H.
+    H = np.broadcast_to(np.asarray(H, float), (k,))
+    chords = cable_geometry(robot, X_WP)
+    T_A = cable_angles(chords.Bx, chords.Bz, H, robot.weight_per_metre).T_A
     D = np.zeros((k, 6))
     for j in range(6):
         rates = np.zeros(k)
         ok = kernel.length_rates(
-            CABLE_MODELS.index(settings.cable_model), settings.order, R, X_WP.translation(),
-            np.eye(6)[j], np.asarray(H, float), np.ones(k), robot.drawing_points,
+            cable_model_index(settings.cable_model), settings.order, R, X_WP.translation(),
+            np.eye(6)[j], T_A, H / T_A, robot.drawing_points,
             robot.attachment_points, body, robot.cable.stiffness.as_array(), run, rates,
         )  # fmt: skip
         if not ok:
