@@ -6,6 +6,8 @@ run keeps its colour and dashes in all figures, a cable its colour; cables count
 
 from __future__ import annotations
 
+import functools
+import io
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -234,7 +236,17 @@ def _figure(width: float, height: float) -> Any:
     """Return an empty Figure of a size in inches, outside pyplot's list of open ones."""
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(width, height), layout="constrained")
+    figure: Any = Figure(figsize=(width, height), layout="constrained")
+    # A notebook knows how to show a Figure only once pyplot has made one there.
+    figure._repr_png_ = functools.partial(_png, figure)
+    return figure
+
+
+def _png(figure: Figure) -> bytes:
+    """Return a figure as the bytes of a PNG file."""
+    file = io.BytesIO()
+    figure.savefig(file, format="png", dpi=DOTS_PER_INCH)
+    return file.getvalue()
 
 
 def _dress(panels: Any) -> None:
