@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 import numpy as np
 import yaml  # type: ignore[import-untyped]
 from pydrake.common.eigen_geometry import AngleAxis
-from pydrake.common.yaml import yaml_dump_typed, yaml_load_data, yaml_load_typed
+from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.errors import RobotFileError
@@ -135,14 +135,18 @@ def _build_value(kind: Any, value: Any) -> Any:
 
 def _parse(text: str) -> Any:
     try:
-        _inspect_keys(yaml.compose(text, Loader=yaml.SafeLoader), "")
-        return yaml_load_data(text)
+        node = yaml.compose(text, Loader=yaml.SafeLoader)
+        _inspect_keys(node, "")
+        data = None if node is None else yaml.SafeLoader("").construct_document(node)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         where = f"line {mark.line + 1}: " if mark else ""
         raise RobotFileError("", "", f"{where}not valid YAML: {error.problem}") from None
     except yaml.YAMLError as error:
         raise RobotFileError("", "", f"not valid YAML: {one_line(error)}") from None
+    if isinstance(data, dict):  # as Drake's reader, which drops what only holds anchors
+        data = {key: value for key, value in data.items() if not key.startswith("_")}
+    return data
 
 
 def _inspect_keys(node: yaml.Node | None, where: str) -> None:
