@@ -598,7 +598,7 @@ def test_results_broadcast_over_cables() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"model": "IRVINE"}, "'IRVINE'; known are ECM, CMWE, SCMWE, SLSM"),
+        ({"model": "IRVINE"}, '"IRVINE"; known are ECM, CMWE, SCMWE, SLSM'),
         ({"model": "ecm"}, "known are ECM"),
         ({"Bx": [7.0, 0.0]}, r"Bx\[1\] = 0: must be positive"),
         ({"Bx": -1.0}, "Bx = -1: must be positive"),
