@@ -13,10 +13,6 @@ from cdpr_drake.model.equilibrium import platform_balance, rest_state
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import exp_rotation
 
-# The start and the goal of Test 4 (paper, 6.2): rotation vector of R_FM [rad] and p_FM [m].
-TEST_4_START = ([2.17, -1.06, 0.48], [0.07, -1.04, 8.9])
-TEST_4_GOAL = ([2.02, -1.39, 0.61], [-0.7, -1.79, 7.49])
-
 
 def swap_halves(x: np.ndarray) -> np.ndarray:
     """Return [b; a] for [a; b], halves of the last axis: (v, omega) from [omega; v] and back."""
@@ -26,12 +22,6 @@ def swap_halves(x: np.ndarray) -> np.ndarray:
 def rotation(rotation_vector: object) -> RotationMatrix:
     """Return the rotation matrix of a rotation vector [rad]."""
     return RotationMatrix(exp_rotation(rotation_vector))
-
-
-def printed_pose(robot: CableRobot, printed: tuple[list[float], list[float]]) -> RigidTransform:
-    """Return X_WP of a pose as the paper prints it, (rotation vector, position) of X_FM."""
-    X_FM = RigidTransform(rotation(printed[0]), printed[1])
-    return robot.cameras.X_WF @ X_FM @ robot.cameras.X_PM.inverse()
 
 
 def oracle_robot(cogiro: CableRobot) -> CableRobot:
