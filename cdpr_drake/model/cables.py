@@ -42,17 +42,11 @@ class CableSet:
         self.num_cables = robot.num_cables
         self._size = sum(packed_sizes(robot.num_cables).values())
         cable = robot.cable
-        self._points = (
-            np.ascontiguousarray(robot.drawing_points, float),
-            np.ascontiguousarray(robot.attachment_points, float),
-        )
-        self._cable = (
-            float(robot.weight_per_metre),
-            cable.stiffness.as_array(),
-            np.ascontiguousarray(cable.drum_run, float),
-            float(cable.damping_time),
-        )
-        self._breaking_load = float(cable.breaking_load)
+        self._points = np.array([robot.drawing_points, robot.attachment_points], float)
+        stiffness = cable.stiffness.as_array()
+        scalars = [robot.weight_per_metre, *stiffness, cable.damping_time, cable.breaking_load]
+        self._constants = np.array([*scalars, *cable.drum_run], float)
+        self._cable = (scalars[0], stiffness, self._constants[6:], cable.damping_time)
 
     def __call__(self, state: Array, length: Array, rate: Array) -> tuple[Array, int]:
         """Return the packed result (6 + 9 k,), its parts as in `packed_sizes`, and a status.
@@ -65,9 +59,9 @@ class CableSet:
             length: (k,) total unstrained lengths [m].
             rate: (k,) their rates [m/s].
         """
-        packed, out = np.empty(self._size), np.empty((self.num_cables, WIDTH))
+        packed = np.empty(self._size)
         status = self._platform.platform_cable_forces(
-            state, length, rate, *self._points, *self._cable, self._breaking_load, packed, out
+            state, length, rate, self._points, self._constants, packed
         )
         return packed, status
 

@@ -45,8 +45,8 @@ class WinchModel:
             float,
         )
 
-    def __call__(self, state: Array, desired: Array, T_A: Array) -> tuple[Array, Array, Array]:
-        """Return the state's derivative (3 k,), motor torques (k,) [N m] and tensions T_W (k,) [N].
+    def __call__(self, state: Array, desired: Array, T_A: Array) -> Array:
+        """Return [derivative of the state (3 k); motor torques (k) [N m]; tensions T_W (k) [N]].
 
         Args:
             state: (3 k,) [angle (rad); rate (rad/s); integral of the angle error (rad s)].
@@ -54,12 +54,12 @@ class WinchModel:
             T_A: (k,) tensions at the drawing points [N].
         """
         k = self.num_cables
-        out = np.zeros(3 * k, state.dtype), np.zeros(k, state.dtype), np.zeros(k, state.dtype)
-        self._evaluate(state, desired, T_A, self.parameters, *out)
+        out = np.empty(5 * k, state.dtype)
+        self._evaluate(state, desired, T_A, self.parameters, out)
         return out
 
     def with_jacobian(self, state: Array, desired: Array, T_A: Array) -> tuple[Array, Array]:
-        """Return [derivative (3 k); torque (k); T_W (k)] and its Jacobian (5 k, 5 k).
+        """Return what a call returns and its Jacobian (5 k, 5 k) by [state; desired; T_A].
 
         Args:
             state: (3 k,) as above.
@@ -74,9 +74,9 @@ class WinchModel:
             # No winch touches another: one complex step moves the same quantity of all of them.
             stepped = z.astype(complex)
             stepped[block * k : (block + 1) * k] += 1j * STEP
-            y = np.concatenate(self(stepped[: 3 * k], stepped[3 * k : 4 * k], stepped[4 * k :]))
+            y = self(stepped[: 3 * k], stepped[3 * k : 4 * k], stepped[4 * k :])
             for row in range(5):
                 jacobian[row * k + cables, block * k + cables] = (
                     y[row * k : (row + 1) * k].imag / STEP
                 )
-        return np.concatenate(self(state, desired, T_A)), jacobian
+        return self(state, desired, T_A), jacobian

@@ -81,7 +81,7 @@ def WinchDynamics_(T: type) -> type:
         def _evaluate(self, x: np.ndarray, desired: np.ndarray, tension: np.ndarray) -> np.ndarray:
             """Return [derivative (3 k); torque (k); tension at the winch (k)]."""
             if T is float:
-                return np.concatenate(self._model(x, desired, tension))
+                return self._model(x, desired, tension)
             k = self._k
             y, jacobian = self._model.with_jacobian(value(x), value(desired), value(tension))
             return chain(y, np.split(jacobian, [3 * k, 4 * k], axis=1), x, desired, tension)
@@ -91,7 +91,7 @@ def WinchDynamics_(T: type) -> type:
             x = self._state(context)
             desired, tension = self._desired_port.Eval(context), self._tension_port.Eval(context)
             if T is float:
-                xdot = self._model(x, desired, tension)[0]
+                xdot = self._model(x, desired, tension)[: 3 * self._k]
             else:
                 xdot = self._evaluate(x, desired, tension)[: 3 * self._k]
             check_finite(value(xdot), self, context, "derivatives")

@@ -1,10 +1,10 @@
 """All cables on one platform: from the platform's state to the wrench on it.
 
 Arguments in common: state (12,) [roll, pitch, yaw, x, y, z, omega, v] of the platform in W;
-drawing, attachment (k, 3) [m]: p_WA and p_PB; p_WB, v_WB (k, 3): attachment points and their
-velocities in W; length, rate (k,): total unstrained lengths and their rates; w [N/m]; stiffness
-(3,); run (k,) [m]; damping_time [s]; limit [N]: breaking load; wrench (6,) and out (k, 14):
-results.
+attachment (k, 3) [m]: p_PB; p_WB, v_WB (k, 3): attachment points and their velocities in W; length,
+rate (k,): total unstrained lengths and their rates; points (2, k, 3) [m]: p_WA and p_PB; constants
+(6 + k,) = [w (N/m); stiffness (3); damping time (s); breaking load (N); runs (m)], few arguments
+because each costs time at every call from Python; packed (6 + 9 k,): the result.
 """
 
 from __future__ import annotations
@@ -37,19 +37,21 @@ def attachment_motion(state, attachment, p_WB, v_WB):
 
 
 @jit
-def platform_cable_forces(
-    state, length, rate, drawing, attachment, w, stiffness, run, damping_time, limit, packed, out
-):
+def platform_cable_forces(state, length, rate, points, constants, packed):
     """Write the cables' wrench [torque; force] at the platform's origin and their outputs, packed.
 
-    Arguments and columns of out (k, 14) as in `cable_forces`; returns its status, or minus the
-    number of a cable whose tension is not below the limit.
+    packed = [wrench (6); T_A (k); T_B (k); t_A (3 k); t_B (3 k); dbeta (k)]. Returns the status of
+    `cable_forces`, or minus the number of a cable whose tension is not below the breaking load.
     """
-    k = drawing.shape[0]
+    k = points.shape[1]
     p_WB = np.empty((k, 3))
     v_WB = np.empty((k, 3))
-    attachment_motion(state, attachment, p_WB, v_WB)
-    status = cable_forces(drawing, p_WB, v_WB, length, rate, w, stiffness, run, damping_time, out)
+    out = np.empty((k, 14))
+    attachment_motion(state, points[1], p_WB, v_WB)
+    status = cable_forces(
+        points[0], p_WB, v_WB, length, rate,
+        constants[0], constants[1:4], constants[6:], constants[4], out,
+    )  # fmt: skip
     for a in range(6):
         packed[a] = 0.0
     for i in range(k):
@@ -66,6 +68,6 @@ def platform_cable_forces(
             packed[6 + 2 * k + 3 * i + a] = out[i, 5 + a]
             packed[6 + 5 * k + 3 * i + a] = out[i, 8 + a]
         packed[6 + 8 * k + i] = out[i, 11]
-        if status == 0 and not max(out[i, 3], out[i, 4]) < limit:
+        if status == 0 and not max(out[i, 3], out[i, 4]) < constants[5]:
             status = -i - 1
     return status
