@@ -1,6 +1,7 @@
 """What a run looks like: figures, block diagrams, and replays that a browser plays."""
 
 from cdpr_drake.show.block_diagram import GraphvizError, block_diagram, block_diagram_dot
+from cdpr_drake.show.mode_plots import mode_shape_figure, pole_figure, stability_figure
 from cdpr_drake.show.plots import (
     cable_sag,
     error_norm_figure,
@@ -12,6 +13,7 @@ from cdpr_drake.show.plots import (
 )
 from cdpr_drake.show.replay import write_replay
 from cdpr_drake.show.screenshot import BrowserError, screenshot_replay
+from cdpr_drake.show.study_plots import gain_map_figure, rates_and_responses_figure
 
 __all__ = [
     "BrowserError",
@@ -20,11 +22,16 @@ __all__ = [
     "block_diagram_dot",
     "cable_sag",
     "error_norm_figure",
+    "gain_map_figure",
+    "mode_shape_figure",
     "motor_rate_figure",
+    "pole_figure",
     "pose_error_figure",
+    "rates_and_responses_figure",
     "sag_figure",
     "save_figures",
     "screenshot_replay",
+    "stability_figure",
     "tension_figure",
     "write_replay",
 ]
