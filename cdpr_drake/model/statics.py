@@ -154,14 +154,7 @@ def minimum_norm_horizontal_tensions(robot: CableRobot, pose: RigidTransform | A
     geometry = cable_geometry(robot, X_WP)
     matrix = D_theta(geometry)
     check_rank(matrix)
-    H = np.asarray(np.linalg.lstsq(matrix, weight_wrench(robot, geometry), rcond=None)[0], float)
-    worst = int(np.argmin(H))
-    if H[worst] <= 0.0:
-        raise TensionError(
-            f"minimum-norm tensions at {_describe(X_WP)} would need cable {worst + 1} to push "
-            f"(horizontal tension {H[worst]:.1f} N): it is outside the wrench-feasible workspace"
-        )
-    return H
+    return distribute(robot, matrix, weight_wrench(robot, geometry), "minimum norm", X_WP)
 
 
 def bounded_distribution(
