@@ -136,7 +136,7 @@ def test_the_error_decays_exponentially_on_the_group_of_motions(moving: np.ndarr
     gain, times = 0.4, np.linspace(0.0, 10.0, 6)
     s = integrated_error(start, goal, gain, times, moving)
     assert math.degrees(np.linalg.norm(s[0, :3])) == pytest.approx(154.3, abs=0.1)
-    np.testing.assert_allclose(s, np.exp(-gain * times)[:, None] * s[0], atol=2e-11)
+    np.testing.assert_allclose(s, np.exp(-gain * times)[:, None] * s[0], rtol=0.0, atol=2e-10)
 
 
 # --- rates of the lengths (eq. 14)
