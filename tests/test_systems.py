@@ -28,7 +28,8 @@ from cdpr_drake.model.equilibrium import rest_state
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.servo import ServoSettings
 
-NAMES = tuple(name for name in systems.__all__ if not name.endswith("_"))
+# Those for AutoDiffXd too; the sampled cameras have their own tests, test_vision_systems.
+NAMES = tuple(name for name in systems.__all__ if f"{name}_" in systems.__all__)
 EACH_SYSTEM = pytest.mark.parametrize("name", NAMES)
 
 START = RigidTransform(rotation([0.1, -0.05, 0.2]), [0.4, -0.3, 1.0])
@@ -44,7 +45,11 @@ MAKE: dict[str, tuple[Callable[[CableRobot], LeafSystem], tuple[str, ...]]] = {
         ("robot", "calibrated"),
     ),
     "CableTangentCameras": (lambda r: systems.CableTangentCameras(r), ("robot",)),
-    "LoadCellFilter": (lambda r: systems.LoadCellFilter(r, misplaced(r)), ("robot", "calibrated")),
+    "LoadCellFilter": (
+        lambda r: systems.LoadCellFilter(r, misplaced(r)),
+        ("robot", "calibrated", "outages"),
+    ),
+    "PlausibleTension": (lambda r: systems.PlausibleTension(r), ("robot",)),
     "PositionBasedVisualServo": (
         lambda r: systems.PositionBasedVisualServo(r, SETTINGS),
         ("robot", "settings"),
@@ -77,6 +82,7 @@ INPUTS: dict[str, dict[str, int]] = {
     "CameraMeasurement": {"pose": 6, "noise": 6},
     "CableTangentCameras": {"tangents": 3 * K, "noise": 3 * K},
     "LoadCellFilter": {"tension_at_winch": K, "noise": K},
+    "PlausibleTension": {"measured_tension": K},
     "PositionBasedVisualServo": {
         "measured_pose": 6,
         "measured_tangents": 3 * K,
@@ -112,6 +118,7 @@ OUTPUTS: dict[str, dict[str, int]] = {
     "CameraMeasurement": {"measured_pose": 6},
     "CableTangentCameras": {"measured_tangents": 3 * K},
     "LoadCellFilter": {"measured_tension": K},
+    "PlausibleTension": {"plausible_tension": K},
     "PositionBasedVisualServo": {"motor_rates": K, "pose_error": 6},
     "PoseError": {"pose_error": 6},
     "MotorAngleIntegrator": {"motor_angles": K},
@@ -135,6 +142,7 @@ FEEDTHROUGH: dict[str, set[tuple[str, str]]] = {
     "CameraMeasurement": all_pairs("CameraMeasurement"),
     "CableTangentCameras": all_pairs("CableTangentCameras"),
     "LoadCellFilter": set(),
+    "PlausibleTension": all_pairs("PlausibleTension"),
     "PositionBasedVisualServo": {(i, "motor_rates") for i in INPUTS["PositionBasedVisualServo"]}
     | {("measured_pose", "pose_error"), ("desired_pose", "pose_error")},
     "PoseError": all_pairs("PoseError"),

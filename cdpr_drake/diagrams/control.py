@@ -12,15 +12,22 @@ from pydrake.systems.primitives import DiscreteTimeDelay, RandomSource, ZeroOrde
 from cdpr_drake.diagrams.robot import ROBOT_OUTPUTS, make_cable_robot
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.servo import ServoSettings
+from cdpr_drake.model.vision.outages import Outage
 from cdpr_drake.systems import (
     CableTangentCameras,
     CameraMeasurement,
     InverseKinematicsAngles,
     LoadCellFilter,
     MotorAngleIntegrator,
+    PlausibleTension,
     PoseError,
     PositionBasedVisualServo,
+    StereoTangentCameras,
+    TargetCameras,
 )
+
+SENSORS = ("gaussian", "targets")
+"""What cameras deliver: the truth with Gaussian noise, or what follows from what they see."""
 
 NOISE_PERIOD = 0.05
 """How long a noise sample lasts in an all-continuous loop with noise [s]."""
@@ -35,6 +42,9 @@ def make_vision_based_control(
     *,
     calibrated: CableRobot | None = None,
     noise: bool = False,
+    sensors: str = "gaussian",
+    estimator: str = "joint",
+    outages: tuple[Outage, ...] = (),
     settings: ServoSettings | None = None,
     **servo: Any,
 ) -> Diagram:
@@ -58,9 +68,12 @@ def make_vision_based_control(
         - desired_motor_angles
         - those of make_cable_robot
 
-    Blocks: "robot", "camera", "tangent_cameras", "load_cells", "servo", "integrator", "true_error";
-    in the sampled loop "sampled_pose", "sampled_tangents", "sampled_tension" and "held_rates" too.
-    Measurements are taken at k T; the motor rates change at k T + latency and are held.
+    Blocks: "robot", "camera", "tangent_cameras", "load_cells", "plausible_tension", "servo",
+    "integrator", "true_error"; in the sampled loop "sampled_pose", "sampled_tangents",
+    "sampled_tension" and "held_rates" too. Measurements are taken at k T; the motor rates change at
+    k T + latency and are held. With sensors "targets" the camera blocks are `TargetCameras` and
+    `StereoTangentCameras`, which sample by themselves, and the loop has their outputs num_targets,
+    num_cameras, age, frames_lost (of the pose) and valid_tangents too.
 
     Args:
         robot: the true robot.
@@ -71,13 +84,19 @@ def make_vision_based_control(
         calibrated: the robot as the controller believes it; the true one if None.
         noise: whether to add named sources of measurement noise; otherwise noise ports are
             exported. Sources hold discrete and abstract state, which no linearisation takes.
+        sensors: "gaussian", or "targets" for a pose from the patterns' points in the images of the
+            pose cameras, and tangents from the cables' edges in those of the stereo pairs.
+        estimator: of the pose from targets, "joint" or "mean" (the paper's).
+        outages: when load cells are stuck or dead and, with targets, cameras see nothing.
         settings: the law's other settings; its cable_model and gain give way to those above.
         servo: fields of ServoSettings (order, ramp_time, max_speed, max_angular_speed,
             model_drum_run), over those of `settings`.
 
     Raises:
         GeometryError: the cables cannot control all six degrees of freedom.
-        ValueError: a gain, period or latency out of range; gain * sample_time >= 1.
+        RobotFileError: with targets, the robot lacks the cameras or patterns they need.
+        ValueError: a gain, period or latency out of range; gain * sample_time >= 1; unknown
+            sensors; targets without sampling or without latency.
     """
     believed = calibrated if calibrated is not None else robot
     k = robot.num_cables
@@ -88,12 +107,18 @@ def make_vision_based_control(
     fields = {**(vars(settings) if settings else {}), **servo}
     law = ServoSettings(**{**fields, "cable_model": cable_model, "gain": gain})
     check_sampling(gain, sample_time, latency)
+    with_targets = _check_sensors(sensors, sample_time, latency)
 
     builder = DiagramBuilder()
     plant = builder.AddNamedSystem("robot", make_cable_robot(robot))
-    camera = builder.AddNamedSystem("camera", CameraMeasurement(robot, believed))
-    tangents = builder.AddNamedSystem("tangent_cameras", CableTangentCameras(robot))
-    cells = builder.AddNamedSystem("load_cells", LoadCellFilter(robot, believed))
+    if with_targets:
+        seeing = TargetCameras(robot, believed, sample_time, estimator, outages)
+        pairs = StereoTangentCameras(robot, believed, sample_time, outages)
+    else:
+        seeing, pairs = CameraMeasurement(robot, believed), CableTangentCameras(robot)
+    camera = builder.AddNamedSystem("camera", seeing)
+    tangents = builder.AddNamedSystem("tangent_cameras", pairs)
+    cells = builder.AddNamedSystem("load_cells", LoadCellFilter(robot, believed, outages))
     servo_law = builder.AddNamedSystem("servo", PositionBasedVisualServo(believed, law))
     integrator = builder.AddNamedSystem("integrator", MotorAngleIntegrator(k))
     error = builder.AddNamedSystem("true_error", PoseError(robot))
@@ -109,10 +134,21 @@ def make_vision_based_control(
         "tangents": tangents.GetOutputPort("measured_tangents"),
         "tension": cells.GetOutputPort("measured_tension"),
     }
+    if with_targets:
+        tension = plant.GetOutputPort("tension_at_drawing_point")
+        builder.Connect(tension, tangents.GetInputPort("tension_at_drawing_point"))
+        for name in ("pose", "tension"):
+            builder.Connect(measured[name], tangents.GetInputPort(f"measured_{name}"))
+        for name in ("num_targets", "num_cameras", "age", "frames_lost"):
+            builder.ExportOutput(camera.GetOutputPort(name), name)
+        builder.ExportOutput(tangents.GetOutputPort("valid_tangents"), "valid_tangents")
     rates = servo_law.GetOutputPort("motor_rates")
     if sample_time is not None:
-        measured, rates = _sample(builder, measured, rates, sample_time, latency)
-    for name, port in measured.items():
+        held = {"pose", "tangents"} if with_targets else set()
+        measured, rates = _sample(builder, measured, held, rates, sample_time, latency)
+    plausible = builder.AddNamedSystem("plausible_tension", PlausibleTension(believed))
+    builder.Connect(measured["tension"], plausible.get_input_port())
+    for name, port in (measured | {"tension": plausible.get_output_port()}).items():
         builder.Connect(port, servo_law.GetInputPort(f"measured_{name}"))
     builder.Connect(rates, integrator.GetInputPort("motor_rates"))
     builder.Connect(
@@ -225,6 +261,19 @@ def check_sampling(gain: float, sample_time: float | None, latency: float) -> No
         )
 
 
+def _check_sensors(sensors: str, sample_time: float | None, latency: float) -> bool:
+    """Return whether the sensors see targets; raise ValueError for what they cannot do."""
+    if sensors not in SENSORS:
+        raise ValueError(f'unknown sensors "{sensors}"; known are {", ".join(SENSORS)}')
+    if sensors != "targets":
+        return False
+    if sample_time is None:
+        raise ValueError("cameras that see targets take images: give a sample time")
+    if latency <= 0.0:
+        raise ValueError("cameras that see targets take time: the latency must be above 0")
+    return True
+
+
 def split_latency(sample_time: float, latency: float) -> tuple[int, float]:
     """Return (n, phase) with latency = n T + phase and 0 <= phase < T, phases near T rounded.
 
@@ -240,11 +289,15 @@ def split_latency(sample_time: float, latency: float) -> tuple[int, float]:
 def _sample(
     builder: DiagramBuilder,
     measured: dict[str, OutputPort],
+    held: set[str],
     rates: OutputPort,
     sample_time: float,
     latency: float,
 ) -> tuple[dict[str, OutputPort], OutputPort]:
     """Hold the measurements at k T and the motor rates from k T + latency on.
+
+    Measurements named in `held` come from systems that sample and hold by themselves: what those
+    took at k T can be read a frame later at the earliest, one sampler less is needed.
 
     Systems that update at the same instant read each other's old values. So when the latency is a
     whole number n of frames, `held_rates`, updating at k T too, reads what the samplers took a
@@ -260,10 +313,14 @@ def _sample(
         return measured, hold.get_output_port()
     sampled = {}
     for name, port in measured.items():
+        steps = delay - 1 if name in held else delay
+        if steps < 0:
+            sampled[name] = port
+            continue
         sampler = (
             ZeroOrderHold(sample_time, port.size())
-            if delay == 0
-            else DiscreteTimeDelay(sample_time, delay, port.size())
+            if steps == 0
+            else DiscreteTimeDelay(sample_time, steps, port.size())
         )
         builder.AddNamedSystem(f"sampled_{name}", sampler)
         builder.Connect(port, sampler.get_input_port())

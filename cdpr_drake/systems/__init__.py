@@ -1,4 +1,7 @@
-"""The pieces of the robot and its control: each a Drake LeafSystem, for float and AutoDiffXd."""
+"""The pieces of the robot and its control: each a Drake LeafSystem.
+
+All are for float and AutoDiffXd, but for the sampled cameras, which OpenCV works for.
+"""
 
 from cdpr_drake.systems.cable_force import CatenaryCableForce, CatenaryCableForce_
 from cdpr_drake.systems.camera import (
@@ -14,6 +17,7 @@ from cdpr_drake.systems.joint_space import (
     InverseKinematicsAngles_,
 )
 from cdpr_drake.systems.load_cell import LoadCellFilter, LoadCellFilter_
+from cdpr_drake.systems.plausible_tension import PlausibleTension, PlausibleTension_
 from cdpr_drake.systems.servo import (
     MotorAngleIntegrator,
     MotorAngleIntegrator_,
@@ -22,6 +26,8 @@ from cdpr_drake.systems.servo import (
     PositionBasedVisualServo,
     PositionBasedVisualServo_,
 )
+from cdpr_drake.systems.stereo import StereoTangentCameras
+from cdpr_drake.systems.targets import TargetCameras
 from cdpr_drake.systems.winch import WinchDynamics, WinchDynamics_
 from cdpr_drake.systems.zero_when_open import ZeroWhenOpen, ZeroWhenOpen_
 
@@ -40,10 +46,14 @@ __all__ = [
     "LoadCellFilter_",
     "MotorAngleIntegrator",
     "MotorAngleIntegrator_",
+    "PlausibleTension",
+    "PlausibleTension_",
     "PoseError",
     "PoseError_",
     "PositionBasedVisualServo",
     "PositionBasedVisualServo_",
+    "StereoTangentCameras",
+    "TargetCameras",
     "WinchDynamics",
     "WinchDynamics_",
     "ZeroWhenOpen",

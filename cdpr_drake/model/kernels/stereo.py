@@ -5,7 +5,8 @@ Arguments: A (3,), u (3,): drawing point and unit tangent there, from A to B, in
 stations (n,): unstrained lengths from A [m]; camera (21,): as kernels/vision.py has it; plane
 (2, n, 2): normalised image coordinates of both edges, NaN where not seen; pixels: the same in
 pixels; normal (3,): unit normal of an interpretation plane, in W. For k cables: drawing (k, 3),
-tangents (k, 3), tensions (k,), lefts, rights (k, 21), images (k, 2, 2, n, 2) by cable, camera, edge.
+tangents (k, 3), tensions (k,), lefts, rights (k, 21), images (k, 2, 2, n, 2) by cable, camera and
+edge.
 """
 
 from __future__ import annotations
@@ -89,7 +90,7 @@ def edges(camera, A, u, T, w, EA, radius, stations, plane):
 
 @jit
 def to_pixels(camera, width, height, plane, pixels):
-    """Write the pixels of points without distortion; NaN outside of the image."""
+    """Write the pixels of points without distortion; NaN outside of the image, width x height."""
     J = np.empty((2, 2))
     for edge in range(2):
         for n in range(plane.shape[1]):
@@ -151,7 +152,8 @@ def cable_plane(camera, plane, normal):
 def direction(left, right, left_plane, right_plane, towards, u):
     """Write the direction u of the line in which two interpretation planes meet (eq. 17).
 
-    Returns the sine of the angle between the planes, 0 if one is not seen; u points `towards` (3,).
+    left and right are cameras, left_plane and right_plane what they see. Returns the sine of the
+    angle between the planes, 0 if one is not seen; u points `towards` (3,).
     """
     n, m = np.empty(3), np.empty(3)
     if not cable_plane(left, left_plane, n) or not cable_plane(right, right_plane, m):
@@ -226,8 +228,8 @@ def measure(
 
     What the pairs see is the direction of a line laid through a sagging piece of cable. For a
     tangent u and the tension, the same line is laid through the piece computed; u is moved until
-    both agree. towards (k, 3): directions from A to B; sines (k,): of the angles between the planes,
-    0 where a cable is not seen; bias (k,): angle from tangent to line [rad].
+    both agree. towards (k, 3): directions from A to B; sines (k,): of the angles between planes, 0
+    where a cable is not seen; bias (k,): angle from tangent to line [rad].
     """
     n = stations.shape[0]
     seen = np.empty((2, 2, n, 2))

@@ -18,7 +18,7 @@ FLATTEST_CROSSING = 0.02
 would leave it uncertain by 10 mrad."""
 
 FARTHEST_ASIDE = 0.1
-"""A cable hangs in the vertical plane of A and B: a direction that leaves it by more is wrong [-]."""
+"""A cable hangs in the vertical plane of A and B: a direction farther out of it is wrong [-]."""
 
 LEAST_TENSION = 0.1
 """Part of the cable's min_tension below which a measured tension is not believed [-]: a dead load
@@ -59,7 +59,8 @@ class _Stereo:
         self.sizes = np.array(
             [[(c.width, c.height) for c in (p.left, p.right)] for p in pairs], float
         )
-        self.stations = np.linspace(*setup.cable_segment, setup.edge_points)
+        start, end = setup.cable_segment
+        self.stations = np.linspace(float(start), float(end), setup.edge_points)
         self.radius = 0.5 * robot.cable.diameter
         self.drawing = np.array(robot.drawing_points)
         self.shape = (robot.num_cables, 2, 2, setup.edge_points)
