@@ -737,7 +737,7 @@ def test_error_control_and_fixed_steps_agree(cogiro: CableRobot) -> None:
         diagram = LOOPS["latency 40 ms"](cogiro)
         context = rest_context(diagram, X_REST)
         diagram.GetInputPort("external_wrench").FixValue(context, [0, 0, 0, 50.0, 0, -100.0])
-        ends.append(simulate(diagram, context, 0.25, record=["pose"], **options)["pose"][-1])
+        ends.append(simulate(diagram, context, 0.15, record=["pose"], **options)["pose"][-1])
     assert np.abs(ends[0] - pose_to_vector(X_REST)).max() > 1e-3
     np.testing.assert_allclose(*ends, atol=2e-6)
 

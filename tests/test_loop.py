@@ -37,7 +37,7 @@ def error_of(s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize(
-    "until", [pytest.param(80.0, marks=pytest.mark.needs("numba")), 4.0], ids=["whole", "start"]
+    "until", [pytest.param(80.0, marks=pytest.mark.needs("numba")), 2.5], ids=["whole", "start"]
 )
 def test_the_exact_law_lets_the_error_decay_exponentially(cogiro: CableRobot, until: float) -> None:
     """Test 4, continuous, exact in model, measurement and calibration, from rest.
