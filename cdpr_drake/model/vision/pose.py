@@ -139,9 +139,10 @@ class PoseEstimator:
         )
         if steps < 0:
             return None
+        covariance: Any = self.pixel_sigma**2 * np.linalg.inv(information)
         return PoseEstimate(
             X_WP=_transform(X),
-            covariance=self.pixel_sigma**2 * np.linalg.inv(information),
+            covariance=covariance,
             num_targets=len(set(np.concatenate([v.points for v in views]).tolist())),
             num_cameras=len({v.camera for v in views}),
             pixel_error=float(np.sqrt(cost / seen.size)),
@@ -163,7 +164,7 @@ class PoseEstimator:
             covariance=to_P @ total @ to_P.T / len(poses) ** 2,
             num_targets=len(set(np.concatenate([v.points for v in views]).tolist())),
             num_cameras=len({v.camera for v in views}),
-            pixel_error=self._pixel_error(views, X_WP),
+            pixel_error=self._pixel_error(self._stacked(views), X_WP),
         )
 
     def _view_poses(self, views: list[_View], prior: RigidTransform | None) -> list[PoseEstimate]:
@@ -172,7 +173,8 @@ class PoseEstimator:
         if not flat:
             return []
         if len(views) > 1 or prior is None:
-            reference = min(flat, key=lambda X: self._pixel_error(views, X))
+            everything = self._stacked(views)
+            reference = min(flat, key=lambda X: self._pixel_error(everything, X))
         else:
             reference = prior
         nearest = [min(a, key=lambda X: _angle(reference, X)) for a in answers if a]
@@ -204,8 +206,8 @@ class PoseEstimator:
                 poses.append(self._X_WC[view.camera] @ X_CT @ self._X_TP[view.pattern])
         return poses
 
-    def _pixel_error(self, views: list[_View], X_WP: RigidTransform) -> float:
-        which, points, seen = self._stacked(views)
+    def _pixel_error(self, stacked: tuple[Any, Array, Array], X_WP: RigidTransform) -> float:
+        which, points, seen = stacked
         G, g = np.empty((6, 6)), np.empty(6)
         cost = self._kernel.normal_equations(
             points, which, seen, self._geometry.cameras, _rows(X_WP), G, g
