@@ -8,6 +8,7 @@ from cdpr_drake.study.compare import (
 )
 from cdpr_drake.study.equilibrium import Residuals, equilibrium, residuals, true_pose
 from cdpr_drake.study.gain_matrix import GainMap, GainMatrix, gain_matrix, map_gain_matrix
+from cdpr_drake.study.growth import SimulatedMode, simulate_modes
 from cdpr_drake.study.linear import LinearizationWarning, Linearizer, linearize
 from cdpr_drake.study.modes import Mode, Modes, modes, platform_modes
 from cdpr_drake.study.neutral import (
@@ -53,6 +54,7 @@ __all__ = [
     "Residuals",
     "ResponseMetrics",
     "SampledServo",
+    "SimulatedMode",
     "StabilityMap",
     "StabilityWarning",
     "StateSpace",
@@ -76,6 +78,7 @@ __all__ = [
     "residuals",
     "response_metrics",
     "side_by_side",
+    "simulate_modes",
     "simulated_period_map",
     "stability_map",
     "step_response",

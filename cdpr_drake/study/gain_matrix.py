@@ -95,7 +95,8 @@ class GainMatrix:
         values = ", ".join(
             f"{v.real:.4f}" if abs(v.imag) < 1e-9 else f"{v:.4f}" for v in self.eigenvalues
         )
-        lines.append(f"eigenvalues (rate of convergence / lambda): {values}")
+        lines.append("eigenvalues, the rates of convergence over lambda:")
+        lines.append("  " + values)
         return "\n".join(lines)
 
 

@@ -46,7 +46,7 @@ class Mode:
         frequency: undamped natural frequency |s| / 2 pi [Hz], 0 for a real eigenvalue. A sampled
             loop shows frequencies above 1 / 2 T, which decay within a few periods, folded down.
         damping: ratio -Re(s) / |s|; 1 for a real eigenvalue that decays, NaN for a neutral one.
-        time_constant: -1 / Re(s) [s]; negative if it grows, infinite if neutral.
+        time_constant: -1 / Re(s) [s]; negative if it grows, infinite if it does neither.
         participation: share of each state (n,), adding up to 1.
         shape: right eigenvector (n,), largest entry 1.
     """
@@ -68,6 +68,11 @@ class Mode:
     def is_stable(self) -> bool:
         """Whether it decays."""
         return self.eigenvalue.real < 0.0 and not self.is_neutral
+
+    @property
+    def grows(self) -> bool:
+        """Whether it grows, by more than 1e-6 1/s: an undamped oscillation does not."""
+        return self.eigenvalue.real > NEUTRAL
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,7 +105,7 @@ class Modes:
     @property
     def unstable(self) -> tuple[Mode, ...]:
         """The modes that grow."""
-        return tuple(m for m in self.modes if not m.is_neutral and not m.is_stable)
+        return tuple(mode for mode in self.modes if mode.grows)
 
     def participants(self, mode: Mode, count: int = 3) -> list[tuple[str, float]]:
         """Return the groups of states that take part most, with their share.
@@ -163,7 +168,7 @@ class Modes:
         for mode in self.modes:
             part = ", ".join(f"{n} {100 * p:.0f} %" for n, p in self.participants(mode))
             cells = "".join(f"<td>{escape(c)}</td>" for c in (*self._cells(mode), part))
-            color = "" if mode.is_stable or mode.is_neutral else ' style="color:#b00"'
+            color = ' style="color:#b00"' if mode.grows else ""
             rows.append(f"<tr{color}>{cells}</tr>")
         titles = "".join(f"<th>{h}</th>" for h in head)
         tail = ""
@@ -257,7 +262,7 @@ def _mode(s: complex, z: complex | None, shape: Complex, share: Array) -> Mode:
         z=z,
         frequency=abs(s) / (2.0 * math.pi) if oscillates else 0.0,
         damping=math.nan if neutral else -s.real / abs(s),
-        time_constant=math.inf if neutral else -1.0 / s.real,
+        time_constant=math.inf if neutral or s.real == 0.0 else -1.0 / s.real,
         participation=share,
         shape=shape / shape[np.argmax(np.abs(shape))],
     )

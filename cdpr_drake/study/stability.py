@@ -324,7 +324,7 @@ def stability_map(
 
 
 def warn_if_unstable(diagram: Any, context: Any) -> Modes:
-    """Return the modes of a sampled loop, after a StabilityWarning if one of them grows.
+    """Return the modes of a sampled loop, after a StabilityWarning if any of them grows.
 
     Args:
         diagram: the loop.
@@ -334,10 +334,12 @@ def warn_if_unstable(diagram: Any, context: Any) -> Modes:
         LinearizationError: the diagram is not a sampled loop of the kind `one_period_map` takes.
     """
     found = modes(one_period_map(diagram, context))
-    for mode in found.unstable:
+    if found.unstable:
+        worst, *others = found.unstable
         warnings.warn(
-            f"the loop is unstable at this goal: {found.name(mode)} grows by a factor e in "
-            f"{-mode.time_constant:.3g} s ({mode.frequency:.3g} Hz)",
+            f"the loop is unstable at this goal: {found.name(worst)} grows by a factor e in "
+            f"{-worst.time_constant:.3g} s ({worst.frequency:.3g} Hz)"
+            + (f", and {len(others)} more modes grow" if others else ""),
             StabilityWarning,
             stacklevel=2,
         )
