@@ -10,8 +10,20 @@ Pieces are in `cdpr_drake.systems`, loops in `cdpr_drake.diagrams`, questions to
 `cdpr_drake.study`, the mathematics without Drake in `cdpr_drake.model`.
 """
 
+import importlib
+from types import ModuleType
+
 from cdpr_drake.model.robot import CableRobot, load_robot, robot_names, save_robot
 
 __version__ = "0.1.0"
 
 __all__ = ["CableRobot", "__version__", "load_robot", "robot_names", "save_robot"]
+
+_ROOMS = ("diagrams", "experiments", "model", "show", "study", "systems")
+
+
+def __getattr__(name: str) -> ModuleType:
+    """Import a room of the package, by its `name`, when it is first asked for."""
+    if name in _ROOMS:
+        return importlib.import_module(f"cdpr_drake.{name}")
+    raise AttributeError(f"module 'cdpr_drake' has no attribute '{name}'")

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from cdpr_drake.commands.terminal import say
 from cdpr_drake.diagrams import Record
 
 SUMMARY = "summary.json"
@@ -63,6 +64,8 @@ def staged(directory: Path) -> Iterator[Path]:
     try:
         yield folder
         stale = _files_of_earlier_run(directory)
+        if stale:
+            say(f"note: {directory} held an earlier run, now replaced; --output DIR keeps both")
         directory.mkdir(parents=True, exist_ok=True)
         for file in sorted(folder.iterdir()):
             os.replace(file, directory / file.name)

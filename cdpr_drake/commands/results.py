@@ -92,7 +92,7 @@ def _columns(runs: Sequence[Run]) -> list[Column]:
         Column(
             heading=("to 2 %", "s"),
             cells=cells("settled_after", 1),
-            meaning="To 2 %: when the position error fell below 2 % of the first to stay.",
+            meaning="To 2 %: from then on the position error is below 2 % of the first.",
         ),
         Column(
             heading=("strays", "mm"),

@@ -46,7 +46,7 @@ def check_pose(robot: CableRobot, X_WP: RigidTransform, name: str) -> None:
         x, y, z = X_WP.translation()
         raise TensionError(
             f"the {name} at (x, y, z) = ({x:.2f}, {y:.2f}, {z:.2f}) m is outside the "
-            f"wrench-feasible workspace: {error}"
+            f"wrench-feasible workspace with {robot.mass:g} kg to carry: {error}"
         ) from None
 
 

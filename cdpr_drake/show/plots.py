@@ -147,8 +147,8 @@ def sag_figure(runs: Runs, robot: CableRobot) -> Figure:
     figure, panels = _panel_per_run(runs, 2)
     _plot_cables(panels[0], runs, lambda run: np.degrees(run["dbeta"]))
     _plot_cables(panels[1], runs, lambda run: 1e3 * cable_sag(run, robot))
-    panels[0][0].set_ylabel("angle at the platform $d\\beta$ [deg]")
-    panels[1][0].set_ylabel("sag [mm]")
+    panels[0][0].set_ylabel("chord to tangent at the platform $d\\beta$ [deg]")
+    panels[1][0].set_ylabel("sag below the chord [mm]")
     for axes in panels.flat:
         axes.set_ylim(bottom=0.0)
         _number_cables(axes)
@@ -163,7 +163,7 @@ def motor_rate_figure(runs: Runs) -> Figure:
     """
     figure, panels = _panel_per_run(runs, 1)
     _plot_cables(panels[0], runs, lambda run: run["motor_rates"])
-    panels[0][0].set_ylabel("motor rate, paying out > 0 [rad/s]")
+    panels[0][0].set_ylabel("motor rate, positive pays out [rad/s]")
     for axes in panels.flat:
         axes.axhline(0.0, color=REFERENCE, linewidth=0.8, zorder=0)
     _legend_below(figure, panels[0][0])  # the lines end all together, near zero
