@@ -1,7 +1,7 @@
 """Vision-based control of cable-driven parallel robots with sagging cables, on Drake.
 
-The system of Dallej, Gouttefarde, Andreff, Herve and Martinet, "Modeling and vision-based control of
-large-dimension cable-driven parallel robots using a multiple-camera setup", Mechatronics 61, 2019.
+The system of Dallej, Gouttefarde, Andreff, Herve and Martinet, "Modeling and vision-based control
+of large-dimension cable-driven parallel robots using a multiple-camera setup" (Mechatronics, 2019).
 
     import cdpr_drake as cdpr
     robot = cdpr.load_robot("cogiro")

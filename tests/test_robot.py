@@ -164,7 +164,9 @@ def test_the_large_robots_are_cogiro_turned_and_scaled(
     cable = {"drum_run": cogiro.cable.drum_run, "damping_time": cogiro.cable.damping_time}
     assert robot.cable.replace(**cable) == cogiro.cable
     assert robot.winch == cogiro.winch and robot.load_cells == cogiro.load_cells
-    placed = {f: getattr(cogiro.cameras, f) for f in ("pose_cameras", "stereo_pairs", "cable_segment")}
+    placed = {
+        f: getattr(cogiro.cameras, f) for f in ("pose_cameras", "stereo_pairs", "cable_segment")
+    }
     assert robot.cameras.replace(X_WF=X0, **placed) == cogiro.cameras
     assert robot.cable.damping_time > cogiro.cable.damping_time
 

@@ -162,16 +162,16 @@ def _draw_rates(axes: Axes, models: Mapping[str, Modes]) -> None:
     axes.set_xscale("symlog", linthresh=SLOW)
     places = {label: _places(modes) for label, modes in models.items()}
     every = np.concatenate(list(places.values()))
-    for i, (label, modes) in enumerate(models.items()):
+    for i, label in enumerate(models):
         axes.plot(
             *places[label].T, MARKERS[i % len(MARKERS)], color=RUN_COLOURS[i % len(RUN_COLOURS)],
             label=label, markersize=7, mew=1.5, fillstyle="none", linestyle="none",
         )  # fmt: skip
-        if modes.period is not None:
-            axes.axhline(0.5 / modes.period, color=REFERENCE, linewidth=0.8, linestyle=(0, (6, 3)))
     low = 4.0 * min(float(every[:, 0].min()), -1.0)
     high = 4.0 * max(float(every[:, 0].max()), SLOW)
-    top = 1.12 * max(float(every[:, 1].max()), 1.0)
+    highest = max(float(every[:, 1].max()), 1.0)
+    halves = {0.5 / modes.period for modes in models.values() if modes.period is not None}
+    top = 1.12 * max([highest, *(half for half in halves if half < 2.0 * highest)])
     axes.axvspan(0.0, high, color="#F6DED5", zorder=0, linewidth=0)
     axes.axvline(0.0, color="black", linewidth=0.8)
     axes.axhline(0.0, color="black", linewidth=0.8, zorder=0)
@@ -182,8 +182,10 @@ def _draw_rates(axes: Axes, models: Mapping[str, Modes]) -> None:
         shown = [m for m in modes.modes if i == 0 or m in modes.unstable]
         _name_real_poles(axes, modes, shown)
         _name_oscillations(axes, modes, shown, top)
-        if modes.period is not None:
-            axes.text(0.98 * low, 0.5 / modes.period, " half the sampling rate: folded down above",
+    for half in halves:
+        if half < top:
+            axes.axhline(half, color=REFERENCE, linewidth=0.8, linestyle=(0, (6, 3)))
+            axes.text(0.98 * low, half, " half the sampling rate: folded down above",
                       fontsize=7.5, color="0.35", va="bottom")  # fmt: skip
     axes.set_xlabel("rate Re $s$ [1/s], linear below 0.01")
     axes.set_ylabel("frequency Im $s$ / 2$\\pi$ [Hz]")
