@@ -86,12 +86,10 @@ class HybridModel:
         M = np.eye(n + m)
         now = 0.0
         for offset, rows, update in self._merged():
-            M = self.flow(offset - now) @ M
+            M[:n] = self._flow(offset - now) @ M
             now = offset
-            after = M.copy()
-            after[n + rows] = update @ M
-            M = after
-        M = self.flow(self.period - now) @ M
+            M[n + rows] = update @ M
+        M[:n] = self._flow(self.period - now) @ M
         drift = np.concatenate([self.period * self.derivatives, self.mismatch])
         return OnePeriodMap(matrix=M, period=self.period, states=self.states, drift=drift)
 
@@ -101,17 +99,22 @@ class HybridModel:
         Args:
             duration: [s].
         """
+        n, m = self.E.shape
+        return np.vstack([self._flow(duration), np.eye(n + m)[n:]])
+
+    def _flow(self, duration: float) -> Array:
+        """Return (n, n + m): x after a time without events."""
         from scipy.linalg import expm
 
         n, m = self.E.shape
-        F = np.eye(n + m)
+        F = np.eye(n, n + m)
         if duration <= 0.0:
             return F
         held = np.flatnonzero(self.E.any(axis=0))
         A = np.zeros((n + held.size, n + held.size))
         A[:n, :n], A[:n, n:] = self.A, self.E[:, held]
         G = expm(duration * A)
-        F[:n, :n], F[:n, n + held] = G[:n, :n], G[:n, n:]
+        F[:, :n], F[:, n + held] = G[:n, :n], G[:n, n:]
         return F
 
     def _merged(self) -> list[tuple[float, NDArray[np.intp], Array]]:
