@@ -54,6 +54,18 @@ def dispatch(options: Namespace) -> int:
             from cdpr_drake.commands.robots import list_robots
 
             return list_robots()
+        if options.command == "linearize":
+            from cdpr_drake.commands.linearize import linearize_command
+
+            return linearize_command(options)
+        if options.command == "stability":
+            from cdpr_drake.commands.stability import stability_command
+
+            return stability_command(options)
+        if options.command == "coupling":
+            from cdpr_drake.commands.coupling import coupling_command
+
+            return coupling_command(options)
         from cdpr_drake.commands.run import run_command
 
         return run_command(options)

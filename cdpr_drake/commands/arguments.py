@@ -63,7 +63,8 @@ def parse_pose(text: str) -> list[float]:
     return [*angles, *values[:3]]
 
 
-def _models(text: str) -> list[str]:
+def parse_models(text: str) -> list[str]:
+    """Return the names of cable models in a `text`, separated by commas."""
     return [part.strip().upper() for part in text.split(",") if part.strip()]
 
 
@@ -89,6 +90,9 @@ def _build_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
     _add_run(commands)
+    from cdpr_drake.commands.study_arguments import add_study_commands  # imports this module
+
+    add_study_commands(commands)
     commands.add_parser(
         "robots",
         help="list the built-in robots",
@@ -133,7 +137,7 @@ def _add_run(commands: argparse._SubParsersAction[_Parser]) -> None:
         "--controller", choices=("vbc", "jsc", "both"), default="both", help="(default: both)"
     )
     how.add_argument(
-        "--cable-model", type=_models, action="extend", metavar="MODEL,...",
+        "--cable-model", type=parse_models, action="extend", metavar="MODEL,...",
         help="of VBC: ECM, CMWE, SCMWE, SLSM; one run each (default: SCMWE,SLSM)",
     )  # fmt: skip
     how.add_argument("--gain", type=float, metavar="PER_S", help="lambda [1/s]")

@@ -13,8 +13,12 @@ from dataclasses import dataclass
 from typing import Any, TextIO
 
 from cdpr_drake.model.robot import RobotFileWarning
+from cdpr_drake.study.stability import StabilityWarning
 
 NAME = "cdpr-drake"
+
+OURS = (RobotFileWarning, StabilityWarning)
+"""Warnings that are for the user of the command line."""
 
 REDRAW_PERIOD = 0.1
 """Shortest time between two drawings of a progress bar [s]."""
@@ -49,19 +53,20 @@ def print_wrapped(text: str, indent: str = "") -> None:
 
 @contextlib.contextmanager
 def warnings_on_one_line() -> Iterator[None]:
-    """Write warnings about robots on one line of stderr each, and each only once."""
+    """Write this package's warnings on one line of stderr each, and each only once."""
     seen: set[str] = set()
     with warnings.catch_warnings():
         others = warnings.showwarning
 
         def show(message: Any, category: Any, *args: Any, **kwargs: Any) -> None:
-            if not issubclass(category, RobotFileWarning):
+            if not issubclass(category, OURS):
                 others(message, category, *args, **kwargs)
             elif str(message) not in seen:
                 seen.add(str(message))
                 say(f"warning: {message}")
 
-        warnings.simplefilter("always", RobotFileWarning)
+        for category in OURS:
+            warnings.simplefilter("always", category)
         warnings.showwarning = show
         yield
 

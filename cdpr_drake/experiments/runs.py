@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -22,6 +23,7 @@ from cdpr_drake.diagrams import (
     with_reference,
 )
 from cdpr_drake.diagrams.simulation import MAX_STEP
+from cdpr_drake.errors import CdprError
 from cdpr_drake.experiments.metrics import Summary, summarize
 from cdpr_drake.experiments.paper_tests import paper_test, paper_tests
 from cdpr_drake.experiments.reach import check_inverse_kinematics, check_pose
@@ -29,6 +31,7 @@ from cdpr_drake.model.cable_models import CABLE_MODELS
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.rotations import Array, as_pose, pose_to_vector
 from cdpr_drake.model.servo import PoseErrorMap
+from cdpr_drake.study.stability import SampledServo, StabilityWarning, find_gain_limit
 from cdpr_drake.systems import ExponentialApproach
 
 CONTROLLERS = ("VBC", "JSC")
@@ -36,6 +39,12 @@ CONTROLLERS = ("VBC", "JSC")
 
 RECORD_PERIOD = 0.05
 """Time between two lines of a run's record [s]."""
+
+NEARLY_CONTINUOUS = 1e-3
+"""A loop sampled so often [s] has the gain limit of the continuous one to within a per cent."""
+
+MOST_FRAMES_LATE = 10
+"""Up to this latency, in frames, the gain limit is found in a fraction of a second."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -185,6 +194,9 @@ def setup_of_test(number: int, robot: CableRobot | None = None, **changes: Any) 
 def prepare(setup: Setup) -> Prepared:
     """Return a run ready to start. All that can be refused beforehand is refused here.
 
+    A StabilityWarning tells that the gain is above the limit predicted at the goal, or why there is
+    no prediction.
+
     Args:
         setup: the setup.
 
@@ -201,6 +213,8 @@ def prepare(setup: Setup) -> Prepared:
     if setup.controller == "VBC":
         loop.GetInputPort("desired_pose").FixValue(context, pose_to_vector(setup.goal))
     _evaluate_all(loop, context)
+    if message := doubt_about_gain(setup):
+        warnings.warn(message, StabilityWarning, stacklevel=2)
     return Prepared(setup=setup, loop=loop, context=context)
 
 
@@ -228,6 +242,42 @@ def run(setup: Setup | Prepared, progress: Callable[[float], None] | None = None
     if setup.controller == "JSC":
         record = _with_error_to(setup, record)
     return Run(setup=setup, record=record, summary=summarize(record, _offset(setup, record)))
+
+
+def doubt_about_gain(setup: Setup) -> str:
+    """Return why the gain of a setup may be too high for its goal, in a line; "" if it is not.
+
+    Joint space control closes no loop around the gain, so there is no doubt about it.
+
+    Args:
+        setup: the setup.
+    """
+    if setup.controller != "VBC":
+        return ""
+    period, latency = setup.sample_time, setup.latency
+    if period is None:
+        period, latency = NEARLY_CONTINUOUS, 0.0
+    unknown = f"{setup.label}: whether the gain is stable at the goal is not predicted: "
+    if latency > MOST_FRAMES_LATE * period:
+        return f"{unknown}the latency is above {MOST_FRAMES_LATE} frames"
+    try:
+        servo = SampledServo(
+            setup.robot,
+            setup.goal,
+            period,
+            believed=setup.calibrated,
+            cable_model=setup.cable_model,
+            tensions=setup.tensions,
+        )
+    except CdprError as error:
+        return f"{unknown}{error}"
+    limit = find_gain_limit(servo, latency, highest=max(setup.gain, 0.01), points=40)
+    if setup.gain <= limit.gain:
+        return ""
+    return (
+        f"{setup.label}: the gain of {setup.gain:g}/s is above the limit predicted at the goal, "
+        f"{limit.gain:.3g}/s, where {limit.mode} goes unstable at {limit.frequency:.3g} Hz"
+    )
 
 
 def _make_loop(setup: Setup) -> Diagram:

@@ -202,15 +202,16 @@ def _name_real_poles(axes: Axes, modes: Modes, shown: list[Mode]) -> None:
     """Write names and numbers of the real poles below them, those alike together."""
     groups: list[tuple[str, list[float]]] = []
     for mode in shown:
-        if mode.eigenvalue.imag:
+        if mode.eigenvalue.imag and not mode.is_neutral:
             continue
         rate, name = (0.0 if mode.is_neutral else mode.eigenvalue.real), modes.name(mode)
         for known, rates in groups:
             if known == name and (rate == rates[0] or 0.0 < rate / (rates[0] or rate) < ALIKE):
-                rates.append(rate)
                 break
         else:
-            groups.append((name, [rate]))
+            groups.append((name, rates := []))
+        # Zeros that round-off has made a complex pair are two all the same.
+        rates += [rate, rate] if mode.eigenvalue.imag else [rate]
     for name, rates in groups:
         count = f"{len(rates)} × " if len(rates) > 1 else ""
         axes.annotate(
@@ -224,7 +225,7 @@ def _name_oscillations(axes: Axes, modes: Modes, shown: list[Mode], top: float) 
     """Write name and frequency beside each oscillating mode, equal names at one place once."""
     groups: dict[tuple[str, int], list[Mode]] = {}
     for mode in shown:
-        if mode.eigenvalue.imag:
+        if mode.eigenvalue.imag and not mode.is_neutral:
             folded = mode.eigenvalue.imag / (2.0 * math.pi)
             groups.setdefault((modes.name(mode), round(folded)), []).append(mode)
     if not groups:
