@@ -13,6 +13,7 @@ from cdpr_drake.diagrams import (
     make_joint_space_control,
     make_vision_based_control,
     platform_pose,
+    rest_context,
     simulate,
 )
 from cdpr_drake.errors import EquilibriumError
@@ -182,6 +183,15 @@ def test_a_loop_that_is_driven_has_no_rest(cogiro: CableRobot) -> None:
     diagram = make_vision_based_control(weak)
     with pytest.raises(EquilibriumError, match=r"rate\[\d\].*limiting cable \d"):
         equilibrium(diagram, POSE)
+
+
+@pytest.mark.parametrize("sample_time", [None, 0.05])
+def test_noise_has_no_rest(cogiro: CableRobot, sample_time: float | None) -> None:
+    diagram = make_vision_based_control(cogiro, sample_time=sample_time, noise=True)
+    with pytest.raises(EquilibriumError, match=r'"pose_noise" \(RandomSource\) never rests'):
+        equilibrium(diagram, POSE)
+    disturbed = residuals(diagram, rest_context(diagram, POSE, seed=1))
+    assert 1e-5 < disturbed.largest < 10.0
 
 
 def test_an_unknown_rule_is_refused(cogiro: CableRobot) -> None:

@@ -107,6 +107,19 @@ def test_with_a_wrong_calibration_too(cogiro: CableRobot) -> None:
     assert np.abs(gamma.matrix - exact.matrix).max() > 1e-3
 
 
+def test_with_a_load_cell_that_reads_nothing(cogiro: CableRobot) -> None:
+    """The law then takes the cable for straight, and so does the gain matrix."""
+    gain = np.ones(8)
+    gain[2] = 1e-3
+    broken = cogiro.replace(load_cells=cogiro.load_cells.replace(gain=gain))
+    loop = make_vision_based_control(broken, "ECM", gain=0.01, sample_time=None, calibrated=cogiro)
+    gamma = gain_matrix(broken, cogiro, POSE, "ECM")
+    slow = np.sort(slow_eigenvalues(loop, POSE).real / -0.01)
+    np.testing.assert_allclose(gamma.eigenvalues.real, slow, rtol=2e-4)
+    whole = gain_matrix(cogiro, None, POSE, "ECM")
+    assert np.abs(gamma.matrix - whole.matrix).max() > 1e-5
+
+
 def test_exact_knowledge_makes_it_the_identity(cogiro: CableRobot) -> None:
     no_run = cogiro.replace(cable=cogiro.cable.replace(drum_run=np.zeros(8)))
     gamma = gain_matrix(no_run, None, POSE, "ECM").matrix

@@ -78,6 +78,12 @@ def test_repeated_real_eigenvalues_stay_real() -> None:
     assert all(mode.eigenvalue.imag == 0.0 for mode in found.modes)
 
 
+def test_zeros_that_round_off_made_a_pair_stay_two() -> None:
+    found = modes([[0.0, 1e-8, 0.0], [-1e-8, 0.0, 0.0], [0.0, 0.0, -1.0]])
+    assert len(found) == 3 and len(found.neutral) == 2
+    assert all(mode.eigenvalue.imag == 0.0 for mode in found.modes)
+
+
 def test_a_period_s_map_shows_rates() -> None:
     T = 0.05
     M = np.diag([math.exp(-0.1 * T), 1.0, 0.0])

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.primitives import RandomSource
 
 from cdpr_drake.diagrams import rest_context, robot_of
 from cdpr_drake.errors import EquilibriumError, GeometryError, TensionError
@@ -18,7 +19,13 @@ from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, pose_to_vector, vector_to_pose
 from cdpr_drake.model.statics import weight_wrench, wrench_matrix
-from cdpr_drake.study.names import continuous_state_names, discrete_state_names, group_sizes, leaves
+from cdpr_drake.study.names import (
+    block_name,
+    continuous_state_names,
+    discrete_state_names,
+    group_sizes,
+    leaves,
+)
 from cdpr_drake.study.state_space import Array
 from cdpr_drake.systems import LoadCellFilter, MotorAngleIntegrator, WinchDynamics
 
@@ -45,6 +52,12 @@ def equilibrium(loop: Any, pose: RigidTransform | ArrayLike, tensions: str = "mi
             its equation; names residual and limiting cable.
         ValueError: an unknown rule for the tensions.
     """
+    for path, leaf in leaves(loop):
+        if isinstance(leaf, RandomSource):
+            raise EquilibriumError(
+                f"{block_name(path, leaf)} never rests: make the loop without noise, or start a "
+                "noisy one from rest_context"
+            )
     desired = as_pose(pose)
     true = true_pose(loop, desired)
     try:
@@ -174,10 +187,18 @@ def residuals(loop: Any, context: Any) -> Residuals:
         own = system.GetMyContextFromRoot(context)
         if system.num_continuous_states():
             scales.append(_scale(loop, context, system, own, rate_scale))
-        for group, size in enumerate(group_sizes(system)):
+        sizes = group_sizes(system)
+        if not sizes:
+            continue
+        if system.GetUniquePeriodicDiscreteUpdateAttribute() is None:
+            # A source of noise holds its sample until it draws the next.
+            discrete += [np.zeros(size) for size in sizes]
+            discrete_scales += [np.ones(size) for size in sizes]
+            continue
+        after = system.EvalUniquePeriodicDiscreteUpdate(own)
+        for group, size in enumerate(sizes):
             state = own.get_discrete_state(group).CopyToVector()
-            after = system.EvalUniquePeriodicDiscreteUpdate(own).get_vector(group).CopyToVector()
-            discrete.append(after - state)
+            discrete.append(after.get_vector(group).CopyToVector() - state)
             if path[-1] == "held_rates":
                 discrete_scales.append(np.full(size, rate_scale))
             else:

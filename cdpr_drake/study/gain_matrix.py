@@ -28,6 +28,7 @@ from cdpr_drake.study.names import TWIST
 from cdpr_drake.study.platform import RestModel, rest_model
 from cdpr_drake.study.response import excursion, free_response
 from cdpr_drake.study.state_space import Array
+from cdpr_drake.systems.plausible_tension import LEAST
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -240,6 +241,9 @@ class _Asker:
         cells, ours = self.robot.load_cells, self.believed.load_cells
         tension = model.rest.tension_at_drawing_point
         measured = (cells.gain * tension + cells.bias - ours.bias) / ours.gain
+        # As the block "plausible_tension" does.
+        cable = self.believed.cable
+        measured = np.where(measured < LEAST * cable.min_tension, cable.max_tension, measured)
         vector = pose_to_vector(seen)
         z = np.concatenate([vector, vector, np.zeros(6), measured, model.tangents.ravel()])
         k = self.robot.num_cables

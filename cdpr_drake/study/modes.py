@@ -33,7 +33,10 @@ DEADBEAT = 1e-6
 """Eigenvalues of a period's map below this have died out within the period."""
 
 ROUND_OFF = 1e-7
-"""Imaginary parts below this share of an eigenvalue are the round-off of a repeated real one."""
+"""Imaginary parts below this share of an eigenvalue are the round-off of a repeated real one.
+
+So are those that would take months to go round: two zeros that round-off made a pair stay two.
+"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -245,7 +248,7 @@ def _modes(A: Array, states: tuple[str, ...], period: float | None) -> Modes:
             deadbeat += 1
             continue
         s = complex(value) if period is None else complex(np.log(value)) / period
-        if abs(s.imag) <= ROUND_OFF * abs(s):
+        if abs(s.imag) <= max(ROUND_OFF * abs(s), NEUTRAL):
             s = complex(s.real)
         elif value.imag < 0.0:
             continue
