@@ -22,18 +22,24 @@ def attachment_motion(state, attachment, p_WB, v_WB):
 
     state = [roll, pitch, yaw, x, y, z, omega (3), v (3)] of the platform in W.
     """
+    # Plain floats: uncompiled, arithmetic on NumPy's scalars takes four times as long.
     R = np.zeros((3, 3))
-    rpy_matrix(state[0], state[1], state[2], R)
-    wx, wy, wz = state[6], state[7], state[8]
+    rpy_matrix(float(state[0]), float(state[1]), float(state[2]), R)
+    r00, r01, r02 = float(R[0, 0]), float(R[0, 1]), float(R[0, 2])
+    r10, r11, r12 = float(R[1, 0]), float(R[1, 1]), float(R[1, 2])
+    r20, r21, r22 = float(R[2, 0]), float(R[2, 1]), float(R[2, 2])
+    x, y, z = float(state[3]), float(state[4]), float(state[5])
+    wx, wy, wz = float(state[6]), float(state[7]), float(state[8])
+    vx, vy, vz = float(state[9]), float(state[10]), float(state[11])
     for i in range(attachment.shape[0]):
-        bx, by, bz = attachment[i, 0], attachment[i, 1], attachment[i, 2]
-        ex = R[0, 0] * bx + R[0, 1] * by + R[0, 2] * bz
-        ey = R[1, 0] * bx + R[1, 1] * by + R[1, 2] * bz
-        ez = R[2, 0] * bx + R[2, 1] * by + R[2, 2] * bz
-        p_WB[i, 0], p_WB[i, 1], p_WB[i, 2] = ex + state[3], ey + state[4], ez + state[5]
-        v_WB[i, 0] = state[9] + wy * ez - wz * ey
-        v_WB[i, 1] = state[10] + wz * ex - wx * ez
-        v_WB[i, 2] = state[11] + wx * ey - wy * ex
+        bx, by, bz = float(attachment[i, 0]), float(attachment[i, 1]), float(attachment[i, 2])
+        ex = r00 * bx + r01 * by + r02 * bz
+        ey = r10 * bx + r11 * by + r12 * bz
+        ez = r20 * bx + r21 * by + r22 * bz
+        p_WB[i, 0], p_WB[i, 1], p_WB[i, 2] = ex + x, ey + y, ez + z
+        v_WB[i, 0] = vx + wy * ez - wz * ey
+        v_WB[i, 1] = vy + wz * ex - wx * ez
+        v_WB[i, 2] = vz + wx * ey - wy * ex
 
 
 @jit
@@ -50,19 +56,19 @@ def platform_cable_forces(state, length, rate, points, constants, packed):
     attachment_motion(state, points[1], p_WB, v_WB)
     status = cable_forces(
         points[0], p_WB, v_WB, length, rate,
-        constants[0], constants[1:4], constants[6:], constants[4], out,
+        float(constants[0]), constants[1:4], constants[6:], float(constants[4]), out,
     )  # fmt: skip
-    for a in range(6):
-        packed[a] = 0.0
+    x, y, z = float(state[3]), float(state[4]), float(state[5])
+    tx, ty, tz, sx, sy, sz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(k):
-        ex, ey, ez = p_WB[i, 0] - state[3], p_WB[i, 1] - state[4], p_WB[i, 2] - state[5]
-        fx, fy, fz = out[i, 0], out[i, 1], out[i, 2]
-        packed[0] += ey * fz - ez * fy
-        packed[1] += ez * fx - ex * fz
-        packed[2] += ex * fy - ey * fx
-        packed[3] += fx
-        packed[4] += fy
-        packed[5] += fz
+        ex, ey, ez = float(p_WB[i, 0]) - x, float(p_WB[i, 1]) - y, float(p_WB[i, 2]) - z
+        fx, fy, fz = float(out[i, 0]), float(out[i, 1]), float(out[i, 2])
+        tx += ey * fz - ez * fy
+        ty += ez * fx - ex * fz
+        tz += ex * fy - ey * fx
+        sx += fx
+        sy += fy
+        sz += fz
         packed[6 + i], packed[6 + k + i] = out[i, 3], out[i, 4]
         for a in range(3):
             packed[6 + 2 * k + 3 * i + a] = out[i, 5 + a]
@@ -70,4 +76,6 @@ def platform_cable_forces(state, length, rate, points, constants, packed):
         packed[6 + 8 * k + i] = out[i, 11]
         if status == 0 and not max(out[i, 3], out[i, 4]) < constants[5]:
             status = -i - 1
+    packed[0], packed[1], packed[2] = tx, ty, tz
+    packed[3], packed[4], packed[5] = sx, sy, sz
     return status
