@@ -1,0 +1,98 @@
+"""What each reproduced table or figure consists of: work to do, then tables and claims to read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+Result = Mapping[str, Any]
+"""What a case gives: numbers, texts, lists, mappings of these, and NumPy arrays, by name."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """A piece of work that depends on no other.
+
+    Args:
+        key: its name among the cases of a section, fit for a file's name.
+        function: what does it, at the top level of a module; it returns a `Result`.
+        arguments: of the function, plain values by name.
+    """
+
+    key: str
+    function: Callable[..., Result]
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table:
+    """A table to read.
+
+    Args:
+        title: what it shows.
+        headings: of the columns, with units.
+        rows: of numbers and texts; None is an empty cell.
+        note: what one has to know to read it.
+    """
+
+    title: str
+    headings: tuple[str, ...]
+    rows: tuple[tuple[Any, ...], ...]
+    note: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Claim:
+    """A statement of the paper beside what we get.
+
+    Args:
+        text: the statement.
+        printed: the paper's number or words.
+        ours: the number we get.
+        agrees: whether it holds here.
+        reason: why it does not, or what the agreement rests on.
+    """
+
+    text: str
+    printed: str
+    ours: str
+    agrees: bool
+    reason: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """A table or figure of the paper, made again.
+
+    Args:
+        name: as `--only` takes it, e.g. "table4".
+        title: what it is.
+        text: paragraphs: what was done, what is assumed.
+        tables: to read.
+        claims: of the paper.
+        fitted: each value that was fitted or assumed, by its name in the file of assumptions.
+    """
+
+    name: str
+    title: str
+    text: tuple[str, ...] = ()
+    tables: tuple[Table, ...] = ()
+    claims: tuple[Claim, ...] = ()
+    fitted: Mapping[str, Any] = field(default_factory=dict)
+
+
+class Reproduction(Protocol):
+    """What a module of this package offers: `cases` first, then `section` of their results."""
+
+    name: str
+
+    def cases(self) -> Sequence[Case]:
+        """Return the work to do."""
+
+    def section(self, results: Mapping[str, Result]) -> Section:
+        """Return what came of it.
+
+        Args:
+            results: of all cases, by their keys.
+        """
