@@ -20,6 +20,7 @@ from cdpr_drake.experiments.paper_tests import NUMBERS, PaperTest, paper_tests
 from cdpr_drake.model.robot import CableRobot, load_robot, robot_names
 from cdpr_drake.model.rotations import log_rotation
 from cdpr_drake.model.servo import pose_error
+from cdpr_drake.model.vision.outages import LOAD_CELL, POSE_CAMERA, STEREO_PAIR, Outage
 from cdpr_drake.study.response import excursion
 
 # --- the data
@@ -341,3 +342,53 @@ def test_tensions_rank_as_the_paper_reports(number: int, group: set[int], lowest
     ranked = np.argsort(tension if lowest else -tension) + 1
     assert set(ranked[: len(group)].tolist()) == group
     assert not result.summary.slack_cables
+
+
+# --- sensors that see, and fail
+
+NOTHING_LOST = (0,) * 8
+
+
+@pytest.mark.needs("numba")
+@pytest.mark.parametrize(
+    ("sensor", "number", "frames", "images", "tangents"),
+    [
+        (POSE_CAMERA, 2, 0, 20, NOTHING_LOST),
+        (POSE_CAMERA, None, 20, 60, NOTHING_LOST),
+        (STEREO_PAIR, 2, 0, 0, (0, 0, 20, 20, 0, 0, 0, 0)),
+        (STEREO_PAIR, None, 0, 0, (20,) * 8),
+        (LOAD_CELL, 3, 0, 0, NOTHING_LOST),
+    ],
+)
+def test_the_summary_counts_what_cameras_lost(
+    sensor: str, number: int | None, frames: int, images: int, tangents: tuple[int, ...]
+) -> None:
+    outage = Outage(sensor=sensor, number=number, start=0.5, end=1.5)
+    result = run(setup_of_test(4, gain=0.3, until=2.0, sensors="targets", outages=(outage,)))
+    summary = result.summary
+    assert summary.pose_frames_lost == frames
+    assert summary.pose_images_lost == images
+    assert summary.tangent_frames_lost == tangents
+    size = np.linalg.norm(result.record["pose_error"][:, 3:], axis=1)
+    assert size[-1] < 0.7 * size[0] and np.diff(size).max() < 2e-3  # on its way all the time
+    assert summary.lowest_tension > 50.0 and summary.highest_tension < 700.0
+
+
+@pytest.mark.parametrize("changes", [{}, {"controller": "JSC"}])
+def test_where_nothing_is_seen_nothing_is_lost(changes: dict[str, Any]) -> None:
+    summary = short_run(**changes).summary
+    assert summary.pose_frames_lost is summary.pose_images_lost is None
+    assert summary.tangent_frames_lost is None
+    assert summary.to_dict()["pose_frames_lost"] is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"sensors": "sonar"}, 'unknown sensors "sonar"; known are gaussian, targets'),
+        ({"estimator": "best"}, 'unknown estimator "best"; known are joint, mean'),
+    ],
+)
+def test_unknown_sensors_are_refused(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        setup_of_test(4, **changes)

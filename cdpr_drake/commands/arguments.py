@@ -148,6 +148,15 @@ def _add_run(commands: argparse._SubParsersAction[_Parser]) -> None:
     how.add_argument(
         "--latency", type=float, metavar="S", help="from image to motors (default: the robot's)"
     )
+    how.add_argument(
+        "--sensors", default="gaussian", metavar="KIND",
+        help="what VBC's cameras deliver: gaussian, the truth with noise; targets, a pose from the "
+        "patterns' points and tangents from the cables' edges (default: gaussian)",
+    )  # fmt: skip
+    how.add_argument(
+        "--estimator", default="joint", metavar="KIND",
+        help="of the pose from targets: joint, over all images; mean, the paper's (default: joint)",
+    )  # fmt: skip
     how.add_argument("--no-noise", action="store_true", help="perfect cameras and load cells")
     how.add_argument("--seed", type=int, default=0, metavar="N", help="of the noise (default: 0)")
     how.add_argument("--until", type=float, metavar="S", help="time to run")

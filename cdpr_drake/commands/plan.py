@@ -40,6 +40,8 @@ def plan(options: argparse.Namespace) -> tuple[str, list[Setup]]:
         "latency": robot.cameras.latency,
         "noise": not options.no_noise,
         "seed": options.seed,
+        "sensors": options.sensors,
+        "estimator": options.estimator,
     }
     if number is not None:
         test = paper_test(number)
@@ -107,6 +109,8 @@ def describe(name: str, setup: Setup) -> str:
     if setup.sample_time is not None:
         loop = f"{1.0 / setup.sample_time:g} Hz with {1e3 * setup.latency:g} ms of latency"
     noise = f"noise with seed {setup.seed}" if setup.noise else "no noise"
+    if setup.sensors != "gaussian":
+        noise = f"sensors: {setup.sensors} ({setup.estimator} estimate), {noise}"
     return (
         f"{what} on {setup.robot.name}, {setup.robot.mass:g} kg: {way:.2f} m and {turn:.1f} deg in "
         f"{setup.until:g} s, lambda = {setup.gain:g} 1/s, {loop}, {noise}."

@@ -40,6 +40,8 @@ def summarize(name: str, setup: Setup, runs: Sequence[Run]) -> dict[str, Any]:
         "sample_time_s": setup.sample_time,
         "latency_s": setup.latency,
         "noise": setup.noise,
+        "sensors": setup.sensors,
+        "estimator": setup.estimator,
         "seed": setup.seed,
         "runs": {r.setup.label: _outcome(r) for r in runs},
     }
@@ -63,8 +65,21 @@ def print_results(runs: Sequence[Run]) -> None:
     print()
     print_wrapped(" ".join(column.meaning for column in columns if column.meaning))
     for r in runs:
+        if text := _losses(r):
+            print_wrapped(f"{r.setup.label}: {text}.")
         for cable, time in sorted(r.summary.slack_cables.items()):
             print_wrapped(f"{r.setup.label}: cable {cable} went slack at {time:.1f} s.")
+
+
+def _losses(result: Run) -> str:
+    """Return in words what the cameras of a run did not deliver, "" if they delivered all."""
+    summary = result.summary
+    lost = {
+        "frames without a pose": summary.pose_frames_lost,
+        "images of pose cameras without use": summary.pose_images_lost,
+        "tangents not measured": sum(summary.tangent_frames_lost or ()),
+    }
+    return ", ".join(f"{count} {what}" for what, count in lost.items() if count)
 
 
 def _columns(runs: Sequence[Run]) -> list[Column]:

@@ -73,7 +73,8 @@ def make_vision_based_control(
     "sampled_tension" and "held_rates" too. Measurements are taken at k T; the motor rates change at
     k T + latency and are held. With sensors "targets" the camera blocks are `TargetCameras` and
     `StereoTangentCameras`, which sample by themselves, and the loop has their outputs num_targets,
-    num_cameras, age, frames_lost (of the pose) and valid_tangents too.
+    num_cameras, age, frames_lost and images_lost (of the pose), valid_tangents and
+    tangent_frames_lost too.
 
     Args:
         robot: the true robot.
@@ -139,9 +140,10 @@ def make_vision_based_control(
         builder.Connect(tension, tangents.GetInputPort("tension_at_drawing_point"))
         for name in ("pose", "tension"):
             builder.Connect(measured[name], tangents.GetInputPort(f"measured_{name}"))
-        for name in ("num_targets", "num_cameras", "age", "frames_lost"):
+        for name in ("num_targets", "num_cameras", "age", "frames_lost", "images_lost"):
             builder.ExportOutput(camera.GetOutputPort(name), name)
         builder.ExportOutput(tangents.GetOutputPort("valid_tangents"), "valid_tangents")
+        builder.ExportOutput(tangents.GetOutputPort("frames_lost"), "tangent_frames_lost")
     rates = servo_law.GetOutputPort("motor_rates")
     if sample_time is not None:
         held = {"pose", "tangents"} if with_targets else set()

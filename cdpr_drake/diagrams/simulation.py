@@ -32,6 +32,9 @@ RECORDED = (
     "motor_angles",
     "motor_rates",
     "motor_torques",
+    "frames_lost",
+    "images_lost",
+    "tangent_frames_lost",
 )
 """Ports that `simulate` records, those of them that a diagram has."""
 

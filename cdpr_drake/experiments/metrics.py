@@ -48,6 +48,10 @@ class Summary:
         highest_tension: over all cables and the whole run, at the drawing points [N].
         highest_tension_cable: the cable it is in, counting from 1.
         slack_cables: for each cable (counting from 1) that went slack, the first time [s].
+        pose_frames_lost: frames without a pose, so that the last was held; None if cameras deliver
+            the truth with noise, or under joint space control.
+        pose_images_lost: images of single pose cameras that were of no use; None likewise.
+        tangent_frames_lost: for each cable the frames without a tangent; None likewise.
         simulated_time: [s].
         wall_time: how long the run took [s].
         real_time_factor: simulated time over the time it took.
@@ -67,6 +71,9 @@ class Summary:
     highest_tension: float
     highest_tension_cable: int
     slack_cables: dict[int, float]
+    pose_frames_lost: int | None
+    pose_images_lost: int | None
+    tangent_frames_lost: tuple[int, ...] | None
     simulated_time: float
     wall_time: float
     real_time_factor: float
@@ -139,6 +146,11 @@ def summarize(record: Record, offset: Array) -> Summary:
     x, y, z = (1e3 * offset[time >= time[-1] - FINAL_WINDOW].mean(axis=0)).tolist()
     tension = record["tension_at_drawing_point"]
     low, high = tension.min(axis=0), tension.max(axis=0)
+    lost = {
+        name: tuple(int(count) for count in record[name][-1])
+        for name in ("frames_lost", "images_lost", "tangent_frames_lost")
+        if name in record.signals
+    }
     return Summary(
         position_error=position,
         orientation_error=orientation,
@@ -156,6 +168,9 @@ def summarize(record: Record, offset: Array) -> Summary:
         highest_tension=float(high.max()),
         highest_tension_cable=int(high.argmax()) + 1,
         slack_cables=dict(record.slack_cables),
+        pose_frames_lost=sum(lost["frames_lost"]) if "frames_lost" in lost else None,
+        pose_images_lost=sum(lost["images_lost"]) if "images_lost" in lost else None,
+        tangent_frames_lost=lost.get("tangent_frames_lost"),
         simulated_time=float(time[-1] - time[0]),
         wall_time=record.wall_time,
         real_time_factor=record.real_time_factor,

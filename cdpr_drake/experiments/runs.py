@@ -22,6 +22,7 @@ from cdpr_drake.diagrams import (
     simulate,
     with_reference,
 )
+from cdpr_drake.diagrams.control import SENSORS
 from cdpr_drake.diagrams.simulation import MAX_STEP
 from cdpr_drake.errors import CdprError
 from cdpr_drake.experiments.metrics import Summary, summarize
@@ -31,6 +32,8 @@ from cdpr_drake.model.cable_models import CABLE_MODELS
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.rotations import Array, as_pose, pose_to_vector
 from cdpr_drake.model.servo import PoseErrorMap
+from cdpr_drake.model.vision.outages import Outage
+from cdpr_drake.model.vision.pose import ESTIMATORS
 from cdpr_drake.study.stability import SampledServo, StabilityWarning, find_gain_limit
 from cdpr_drake.systems import ExponentialApproach
 
@@ -66,6 +69,9 @@ class Setup:
         until: how long to run [s].
         max_step: step of the integrator [s].
         calibrated: the robot as the controller believes it; the true one if None.
+        sensors: of VBC, one of `SENSORS`: the truth with Gaussian noise, or what cameras see.
+        estimator: of the pose from targets, "joint" or "mean" (the paper's).
+        outages: when load cells of VBC fail and, with sensors that see, its cameras.
         tensions: those of VBC at the start, "minimum norm" or "within limits" of the robot.
 
     Raises:
@@ -86,6 +92,9 @@ class Setup:
     until: float = 80.0
     max_step: float = MAX_STEP
     calibrated: CableRobot | None = None
+    sensors: str = "gaussian"
+    estimator: str = "joint"
+    outages: tuple[Outage, ...] = ()
     tensions: str = "minimum norm"
 
     def __post_init__(self) -> None:
@@ -94,6 +103,8 @@ class Setup:
         for name, choice, known in (
             ("controller", self.controller, CONTROLLERS),
             ("cable model", self.cable_model, CABLE_MODELS),
+            ("sensors", self.sensors, SENSORS),
+            ("estimator", self.estimator, ESTIMATORS),
         ):
             if choice not in known:
                 raise ValueError(f'unknown {name} "{choice}"; known are {", ".join(known)}')
@@ -290,6 +301,9 @@ def _make_loop(setup: Setup) -> Diagram:
             setup.latency,
             calibrated=setup.calibrated,
             noise=setup.noise,
+            sensors=setup.sensors,
+            estimator=setup.estimator,
+            outages=setup.outages,
             ramp_time=setup.ramp_time,
         )
     loop = make_joint_space_control(

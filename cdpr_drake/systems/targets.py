@@ -18,9 +18,9 @@ from cdpr_drake.model.vision.targets import Sightings, TargetImages
 from cdpr_drake.systems._template import GAUSSIAN_INPUT, check_finite
 
 # The discrete state: pose, covariance, and what is counted.
-_POSE, _COVARIANCE, _COUNTS = slice(0, 6), slice(6, 42), slice(42, 47)
-_FRAMES, _TARGETS, _CAMERAS, _AGE, _LOST = range(42, 47)
-_SIZE = 47
+_POSE, _COVARIANCE = slice(0, 6), slice(6, 42)
+_FRAMES, _TARGETS, _CAMERAS, _AGE, _LOST, _IMAGES_LOST = range(42, 48)
+_SIZE = 48
 
 
 class TargetCameras(LeafSystem):
@@ -39,6 +39,7 @@ class TargetCameras(LeafSystem):
         - num_cameras
         - age
         - frames_lost
+        - images_lost
 
     At k T the true cameras see the patterns (section 4.2), with noise and each point's fixed bias,
     and the pose is estimated with what the controller believes of cameras and patterns. Where too
@@ -47,8 +48,9 @@ class TargetCameras(LeafSystem):
     open; covariance (36) is that of a small motion [rotation vector; translation] of P in W [rad,
     m], row by row; num_targets and num_cameras say how many points and cameras took part in the
     last frame; age [s] is how long ago the pose held was measured; frames_lost counts the frames
-    without a pose. All is discrete state: no output depends on an input at once. OpenCV works on
-    plain numbers, so there is no AutoDiffXd.
+    without a pose, images_lost the images of single cameras that were of no use. All is discrete
+    state: no output depends on an input at once. OpenCV works on plain numbers, so there is no
+    AutoDiffXd.
 
     Args:
         robot: the true robot.
@@ -91,6 +93,7 @@ class TargetCameras(LeafSystem):
             ("num_cameras", slice(_CAMERAS, _CAMERAS + 1)),
             ("age", slice(_AGE, _AGE + 1)),
             ("frames_lost", slice(_LOST, _LOST + 1)),
+            ("images_lost", slice(_IMAGES_LOST, _IMAGES_LOST + 1)),
         ):
             size = part.stop - part.start
             self.DeclareVectorOutputPort(name, size, self._part(part), {self.xd_ticket()})
@@ -141,6 +144,7 @@ class TargetCameras(LeafSystem):
             state[[_TARGETS, _CAMERAS]] = 0.0
             state[_AGE] += self.sample_time
             state[_LOST] += 1.0
+        state[_IMAGES_LOST] += self._images.num_cameras - state[_CAMERAS]
         discrete.set_value(state)
 
     def _part(self, part: slice) -> Any:
@@ -154,5 +158,5 @@ def _record(state: Array, estimate: PoseEstimate) -> None:
     """Write an estimate into the discrete state."""
     state[_POSE] = pose_to_vector(estimate.X_WP)
     state[_COVARIANCE] = estimate.covariance.ravel()
-    lost = state[_LOST]
-    state[_COUNTS] = state[_FRAMES] + 1.0, estimate.num_targets, estimate.num_cameras, 0.0, lost
+    state[_FRAMES] += 1.0
+    state[[_TARGETS, _CAMERAS, _AGE]] = estimate.num_targets, estimate.num_cameras, 0.0
