@@ -73,7 +73,7 @@ def test_ports_and_documentation(cogiro: CableRobot) -> None:
         TargetCameras: (
             {"pose": 6, "noise": 120},
             {"measured_pose": 6, "covariance": 36, "num_targets": 1, "num_cameras": 1, "age": 1}
-            | {"frames_lost": 1},
+            | {"frames_lost": 1, "images_lost": 1},
         ),
         StereoTangentCameras: (
             {"tangents": 24, "tension_at_drawing_point": 8, "measured_pose": 6}
@@ -145,12 +145,14 @@ def test_without_any_camera_the_last_pose_is_held_and_its_age_counted(cogiro: Ca
     after = outputs(system, context)
     np.testing.assert_allclose(after["measured_pose"], POSE + 0.01, atol=5e-3)
     assert after["age"] == 0.0 and after["frames_lost"] == 4.0 and after["num_cameras"] == 3.0
+    assert after["images_lost"] == 12.0
 
 
 def test_one_lost_camera_is_not_counted(cogiro: CableRobot) -> None:
     system = TargetCameras(cogiro, outages=(outage("pose camera", 2),))
     got = outputs(system, advance(system, {"pose": POSE}, 0.01))
     assert got["num_cameras"] == 2.0 and got["num_targets"] == 15.0
+    assert got["images_lost"] == 1.0 and got["frames_lost"] == 0.0
     with pytest.raises(ValueError, match="there is no pose camera 4 among 3"):
         TargetCameras(cogiro, outages=(outage("pose camera", 4),))
 
