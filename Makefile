@@ -39,7 +39,7 @@ lint: $(INSTALLED)-dev ## linter, formatter (nothing is rewritten) and type chec
 	$(BIN)/mypy || status=1; \
 	exit $$status
 
-bench: $(INSTALLED)-demo ## the benchmarks
+bench: $(INSTALLED)-bench ## the benchmarks, beside other programs' (NAME with ARGS=NAME)
 	@$(BENCH) $(ARGS)
 
 warm:
@@ -50,10 +50,11 @@ clean: ## remove the virtual environments, what was built, and caches
 	rm -rf .hypothesis .mypy_cache .pytest_cache .ruff_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-# Each set of extras contains the one before, so a larger one vouches for the smaller.
+# A set of extras that contains another vouches for it.
 $(INSTALLED)-demo: EXTRAS := fast
 $(INSTALLED)-test: EXTRAS := fast,test,notebook
 $(INSTALLED)-dev: EXTRAS := fast,test,notebook,dev
+$(INSTALLED)-bench: EXTRAS := fast,bench
 
 $(INSTALLED)-demo: pyproject.toml
 	$(install)
@@ -66,6 +67,10 @@ $(INSTALLED)-test: pyproject.toml
 $(INSTALLED)-dev: pyproject.toml
 	$(install)
 	@touch $(INSTALLED)-demo $(INSTALLED)-test $@
+
+$(INSTALLED)-bench: pyproject.toml
+	$(install)
+	@touch $(INSTALLED)-demo $@
 
 # Make the virtual environment unless it works, and install this checkout with EXTRAS.
 define install

@@ -17,6 +17,7 @@ from cable_classes import CLASSES, random_cables
 from oracle import CABLES, IRVINE_CABLES
 
 from cdpr_drake.errors import CableError
+from cdpr_drake.model import catenary as public
 from cdpr_drake.model.catenary import (
     cable_energy,
     cable_shape,
@@ -728,6 +729,23 @@ def test_error_is_a_cable_error_without_a_time() -> None:
     assert str(caught.value).startswith("cable 2: ")
     assert caught.value.time is None
     assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
+
+
+def test_many_cables_in_one_call_are_as_each_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(public, "BLOCK", 7)
+    generator = np.random.default_rng(0)
+    p = generator.uniform([-9.0, -9.0, -5.0], [9.0, 9.0, -1.0], (23, 3))
+    length = np.linalg.norm(p, axis=1) * generator.uniform(0.998, 1.05, 23)
+    run = generator.uniform(0.0, 5.0, 23)
+    law = AxialStiffness(asymptote=6e5, softening=3e7, offset=200.0)
+    together = vars(elastic_catenary(p, length + run, 0.65, law, run))
+    for i in range(23):
+        alone = vars(elastic_catenary(p[i], length[i] + run[i], 0.65, law, run[i]))
+        for name, values in alone.items():
+            np.testing.assert_array_equal(together[name][i], values[0], err_msg=name)
+    length[17] = -1.0
+    with pytest.raises(CableError, match=r"cable 18: .* length -1 m"):
+        elastic_catenary(p, length, 0.65, law)
 
 
 def test_shapes_that_do_not_match_are_refused() -> None:

@@ -21,6 +21,9 @@ from cdpr_drake.errors import CableError
 
 Array = NDArray[np.float64]
 
+BLOCK = 256
+"""How many cables are solved at a time: their Jacobians stay in the processor's cache."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CableState:
@@ -45,7 +48,7 @@ def elastic_catenary(
     stiffness: Any,
     drum_run: ArrayLike = 0.0,
 ) -> CableState:
-    """Return the state of elastic catenaries at rest.
+    """Return the state of elastic catenaries at rest, of one or of any number in one call.
 
     With (H, V) the tension directed from A to B in the cable's plane, V_A = V_B - w l0, T the norm:
 
@@ -67,24 +70,22 @@ def elastic_catenary(
             not finite or out of all range.
         ValueError: shapes that do not match.
     """
-    from cdpr_drake.model.kernels.catenary import cable_forces_jacobian
-
     p, length, run = _per_cable(p_AB, length, drum_run)
     k = len(p)
-    zeros = np.zeros((k, 3))
-    out, jacobian = np.zeros((k, 14)), np.zeros((k, 14, 8))
-    status = cable_forces_jacobian(
-        zeros, p, zeros, length, zeros[:, 0].copy(), float(w), _law(stiffness), run, 0.0,
-        out, jacobian,
-    )  # fmt: skip
-    if status:
-        i = status - 1
-        raise CableError(
-            status,
-            None,
-            f"no elastic catenary of unstrained length {length[i]:.6g} m, of which {run[i]:.6g} m "
-            f"run from the drum, over a chord of {np.linalg.norm(p[i]):.6g} m",
-        )
+    law, w = _law(stiffness), float(w)
+    out, by_position, by_length = np.empty((k, 14)), np.empty((k, 3, 3)), np.empty((k, 3))
+    for start in range(0, k, BLOCK):
+        part = slice(start, start + BLOCK)
+        status, jacobian = _solve_at_rest(p[part], length[part], w, law, run[part], out[part])
+        if status:
+            i = start + status - 1
+            raise CableError(
+                i + 1,
+                None,
+                f"no elastic catenary of unstrained length {length[i]:.6g} m, of which "
+                f"{run[i]:.6g} m run from the drum, over a chord of {np.linalg.norm(p[i]):.6g} m",
+            )
+        by_position[part], by_length[part] = jacobian[:, :3, :3], jacobian[:, :3, 6]
     return CableState(
         force_on_platform=out[:, :3],
         tension_at_drawing_point=out[:, 3],
@@ -94,9 +95,23 @@ def elastic_catenary(
         dbeta=out[:, 11],
         horizontal_tension=out[:, 12],
         unstrained_span_length=out[:, 13],
-        position_stiffness=jacobian[:, :3, :3],
-        length_stiffness=jacobian[:, :3, 6],
+        position_stiffness=by_position,
+        length_stiffness=by_length,
     )
+
+
+def _solve_at_rest(
+    p_AB: Array, length: Array, w: float, law: Array, run: Array, out: Array
+) -> tuple[int, Array]:
+    """Write the kernel's `out` (k, 14) of cables at rest; return its status and Jacobian."""
+    from cdpr_drake.model.kernels.catenary import cable_forces_jacobian
+
+    zeros = np.zeros((len(p_AB), 3))
+    jacobian = np.empty((len(p_AB), 14, 8))
+    status = cable_forces_jacobian(
+        zeros, p_AB, zeros, length, zeros[:, 0].copy(), w, law, run, 0.0, out, jacobian
+    )
+    return status, jacobian
 
 
 def cable_shape(
