@@ -58,6 +58,18 @@ class WinchModel:
         self._evaluate(state, desired, T_A, self.parameters, out)
         return out
 
+    def derivatives(self, state: Array, desired: Array, T_A: Array) -> tuple[Array, bool]:
+        """Return the derivative of the state (3 k) alone, and whether it is finite.
+
+        Args:
+            state: (3 k,) as above.
+            desired: (k,) desired motor angles [rad].
+            T_A: (k,) tensions at the drawing points [N].
+        """
+        out = np.empty(5 * self.num_cables)
+        finite: bool = self._evaluate(state, desired, T_A, self.parameters, out)
+        return out[: 3 * self.num_cables], finite
+
     def with_jacobian(self, state: Array, desired: Array, T_A: Array) -> tuple[Array, Array]:
         """Return what a call returns and its Jacobian (5 k, 5 k) by [state; desired; T_A].
 

@@ -10,7 +10,13 @@ from pydrake.systems.framework import LeafSystem_
 
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.vision.outages import LOAD_CELL, Outage, Outages
-from cdpr_drake.systems._template import GAUSSIAN_INPUT, check_finite, system_template, value
+from cdpr_drake.systems._template import (
+    GAUSSIAN_INPUT,
+    chain,
+    check_finite,
+    system_template,
+    value,
+)
 
 SINES = 5
 """How many sines make up the cables' vibration."""
@@ -56,18 +62,20 @@ def LoadCellFilter_(T: type) -> type:
             super().__init__(converter=converter)
             self.robot = robot
             self.calibrated = calibrated if calibrated is not None else robot
+            from cdpr_drake.model.kernels.load_cell import filter_derivatives
+
             cells, believed = robot.load_cells, self.calibrated.load_cells
-            self._gain = cells.gain / believed.gain
-            self._bias = (cells.bias - believed.bias) / believed.gain
-            self._sigma = cells.noise / believed.gain
-            self._rate = 2.0 * np.pi * cells.cutoff
-            self._drive = self._rate * self._gain, self._rate * self._bias, self._rate * self._sigma
+            gain, sigma = cells.gain / believed.gain, cells.noise / believed.gain
+            bias = (cells.bias - believed.bias) / believed.gain
+            rate = np.full(robot.num_cables, 2.0 * np.pi * cells.cutoff)
+            self._filter, self._parameters = filter_derivatives, np.array([gain, bias, sigma, rate])
             self._order = cells.order
             k = self._k = robot.num_cables
             self.outages = tuple(outages)
             self._outages = Outages(self.outages, LOAD_CELL, k)
             self._amplitude = cells.vibration_amplitude / np.sqrt(SINES)
             self._frequencies, self._phases = _vibration(cells.vibration_band, k)
+            self._no_noise = np.zeros(k)
             state = self.DeclareContinuousState(self._order * k)
             self._tension_port = self.DeclareVectorInputPort("tension_at_winch", k)
             self._noise_port = self.DeclareVectorInputPort(
@@ -90,38 +98,51 @@ def LoadCellFilter_(T: type) -> type:
             Args:
                 tension_at_winch: (k,) [N].
             """
-            return self._gain * tension_at_winch + self._bias
+            gain, bias, _, _ = self._parameters
+            return gain * tension_at_winch + bias
 
         def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
             """Write the derivatives of the state in a context."""
             x = context.get_continuous_state_vector().CopyToVector()
-            gain, bias, sigma = self._drive
-            drive = gain * self._tension_port.Eval(context) + bias
+            tension, noise = self._tension_port.Eval(context), self._no_noise
             if self._noise_port.HasValue(context):
-                drive += sigma * self._noise_port.Eval(context)
+                noise = self._noise_port.Eval(context)
             if self._amplitude > 0.0:
-                drive = drive + gain * self._vibration(_seconds(context))
-            check_finite(value(drive), self, context, "inputs")
+                tension = tension + self._vibration(_seconds(context))
+            xdot = np.empty(x.size)
+            if T is float:
+                finite = self._filter(x, tension, noise, self._parameters, xdot)
+            else:
+                plain = value(x), value(tension), value(noise)
+                finite = self._filter(*plain, self._parameters, xdot)
+            if not finite:
+                check_finite(xdot, self, context, "derivatives")
+            if T is not float:
+                xdot = chain(xdot, self._jacobians(), x, tension, noise)
             if self._outages:
-                self._fail(_seconds(context), drive, x)
-            if self._order > 1:
-                drive = np.concatenate([drive, self._rate * x[: -self._k]])
-            derivatives.SetFromVector(drive - self._rate * x)
+                self._fail(_seconds(context), x, xdot)
+            derivatives.SetFromVector(xdot)
+
+        def _jacobians(self) -> list[np.ndarray]:
+            """Return those of the derivatives by state, tension and noise: all is linear."""
+            gain, _, sigma, rate = self._parameters
+            k, n = self._k, self._k * self._order
+            through = np.eye(n, n, -k) - np.eye(n)
+            return [rate[0] * through, np.eye(n, k) * rate * gain, np.eye(n, k) * rate * sigma]
 
         def _vibration(self, time: float) -> np.ndarray:
             """Return the vibration (k,) [N] of the tensions."""
             return self._amplitude * np.sin(time * self._frequencies + self._phases).sum(axis=1)
 
-        def _fail(self, time: float, drive: np.ndarray, x: np.ndarray) -> None:
-            """Put what failing cells read into `drive` (k,); stuck ones keep what they show."""
+        def _fail(self, time: float, x: np.ndarray, xdot: np.ndarray) -> None:
+            """Put what failing cells do into the derivatives; stuck ones keep what they show."""
             believed, k = self.calibrated.load_cells, self._k
             for cell, reading in self._outages.at(time).items():
                 if reading is None:
-                    x[cell::k] = x[cell - k]
-                    drive[cell] = self._rate * x[cell]
+                    xdot[cell::k] = 0.0 * x[cell::k]
                 else:
                     y = (reading - believed.bias[cell]) / believed.gain[cell]
-                    drive[cell] = self._rate * y
+                    xdot[cell] = self._parameters[3, cell] * (y - x[cell])
 
         def _calc_tension(self, context: Any, output: Any) -> None:
             output.SetFromVector(context.get_continuous_state_vector().CopyToVector()[-self._k :])

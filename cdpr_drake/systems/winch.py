@@ -70,7 +70,7 @@ def WinchDynamics_(T: type) -> type:
             self.DeclareVectorOutputPort(
                 "tension_at_winch", k, self._calc_tension, own | {self._tension_port.ticket()}
             )
-            self.DeclareStateOutputPort("state", state)
+            self._state_port = self.DeclareStateOutputPort("state", state)
 
         def _construct_copy(self, other: Any, converter: Any = None) -> None:
             Impl._construct(self, other.robot, converter=converter)
@@ -88,13 +88,14 @@ def WinchDynamics_(T: type) -> type:
 
         def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
             """Write the derivatives of the state in a context."""
-            x = self._state(context)
+            x = self._state_port.Eval(context)
             desired, tension = self._desired_port.Eval(context), self._tension_port.Eval(context)
             if T is float:
-                xdot = self._model(x, desired, tension)[: 3 * self._k]
+                xdot, finite = self._model.derivatives(x, desired, tension)
             else:
-                xdot = self._evaluate(x, desired, tension)[: 3 * self._k]
-            check_finite(value(xdot), self, context, "derivatives")
+                xdot, finite = self._evaluate(x, desired, tension)[: 3 * self._k], False
+            if not finite:
+                check_finite(value(xdot), self, context, "derivatives")
             derivatives.SetFromVector(xdot)
 
         def _calc_length(self, context: Any, output: Any) -> None:

@@ -16,10 +16,13 @@ from cdpr_drake.model.kernels import jit
 def winch_derivatives(x, desired, T_A, p, out):
     """Write the derivatives of x = [angle (k); rate (k); integral (k)], the torques and tensions.
 
+    Returns whether the derivatives are finite.
+
     p = [inertia, damping, Kp, Ki, Kd, torque limit, transmission, Coulomb torque, Coulomb rate,
     capstan exponent, capstan speed].
     """
     k = desired.shape[0]
+    size = 0.0
     for i in range(k):
         rate = x[k + i]
         error = desired[i] - x[i]
@@ -38,8 +41,11 @@ def winch_derivatives(x, desired, T_A, p, out):
         load = p[6] * T_W - p[1] * rate
         if p[7] > 0.0:
             load = load - p[7] * np.tanh(rate / p[8])
+        acceleration = (torque + load) / p[0]
+        size += abs(rate.real) + abs(acceleration.real) + abs(integrate.real)
         out[i] = rate
-        out[k + i] = (torque + load) / p[0]
+        out[k + i] = acceleration
         out[2 * k + i] = integrate
         out[3 * k + i] = torque
         out[4 * k + i] = T_W
+    return size < np.inf
