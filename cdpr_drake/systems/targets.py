@@ -7,23 +7,17 @@ from typing import Any
 import numpy as np
 from pydrake.common import RandomDistribution
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import LeafSystem
 
-from cdpr_drake.errors import GeometryError, SimulationError
 from cdpr_drake.model.robot import CableRobot
-from cdpr_drake.model.rotations import Array, pose_to_vector, vector_to_pose
+from cdpr_drake.model.rotations import vector_to_pose
 from cdpr_drake.model.vision.outages import POSE_CAMERA, Outage, Outages
 from cdpr_drake.model.vision.pose import PoseEstimate, PoseEstimator
 from cdpr_drake.model.vision.targets import Sightings, TargetImages
 from cdpr_drake.systems._template import GAUSSIAN_INPUT, check_finite
-
-# The discrete state: pose, covariance, and what is counted.
-_POSE, _COVARIANCE = slice(0, 6), slice(6, 42)
-_FRAMES, _TARGETS, _CAMERAS, _AGE, _LOST, _IMAGES_LOST = range(42, 48)
-_SIZE = 48
+from cdpr_drake.systems.held_pose import HeldPose
 
 
-class TargetCameras(LeafSystem):
+class TargetCameras(HeldPose):
     """The platform's pose from the points of its patterns, as sampled by the pose cameras.
 
     .. pydrake_system::
@@ -73,48 +67,34 @@ class TargetCameras(LeafSystem):
         estimator: str = "joint",
         outages: tuple[Outage, ...] = (),
     ) -> None:
-        super().__init__()
+        period = robot.cameras.sample_time if sample_time is None else sample_time
+        super().__init__(len(robot.cameras.pose_cameras), period)
         self.robot = robot
         self.calibrated = calibrated if calibrated is not None else robot
-        self.sample_time = robot.cameras.sample_time if sample_time is None else sample_time
         self._images = TargetImages(robot)
         self._estimate = PoseEstimator(self.calibrated, estimator)
-        self._outages = Outages(outages, POSE_CAMERA, self._images.num_cameras)
+        self._outages = Outages(outages, POSE_CAMERA, self.num_cameras)
         self._pose_port = self.DeclareVectorInputPort("pose", 6)
         self._noise_port = self.DeclareVectorInputPort(
             GAUSSIAN_INPUT, self._images.noise_size, RandomDistribution.kGaussian
         )
-        self.DeclareDiscreteState(_SIZE)
-        self.DeclarePeriodicDiscreteUpdateEvent(self.sample_time, 0.0, self._update)
-        for name, part in (
-            ("measured_pose", _POSE),
-            ("covariance", _COVARIANCE),
-            ("num_targets", slice(_TARGETS, _TARGETS + 1)),
-            ("num_cameras", slice(_CAMERAS, _CAMERAS + 1)),
-            ("age", slice(_AGE, _AGE + 1)),
-            ("frames_lost", slice(_LOST, _LOST + 1)),
-            ("images_lost", slice(_IMAGES_LOST, _IMAGES_LOST + 1)),
-        ):
-            size = part.stop - part.start
-            self.DeclareVectorOutputPort(name, size, self._part(part), {self.xd_ticket()})
 
-    def set_at_rest(self, context: Any) -> None:
-        """Make the held pose what all cameras see now without noise.
+    def measure(self, context: Any, prior: RigidTransform | None) -> PoseEstimate | None:
+        """Return the pose that the points seen now give, or None; see `HeldPose`.
 
         Args:
-            context: the system's own, changed.
-
-        Raises:
-            GeometryError: no camera sees enough of the platform.
+            context: the system's own.
+            prior: the pose held; None in the first frame.
         """
-        pose = self._pose_port.Eval(context)
-        estimate = self._estimate(self._images(vector_to_pose(pose)))
-        if estimate is None:
-            place = np.round(pose[3:], 3).tolist()
-            raise GeometryError(f"no pose camera sees a whole pattern of the platform at {place} m")
-        state = np.zeros(_SIZE)
-        _record(state, estimate)
-        context.SetDiscreteState(state)
+        return self._estimate(self.see(context), prior)
+
+    def measure_at_rest(self, context: Any) -> PoseEstimate | None:
+        """Return the pose that all cameras show now without noise, or None.
+
+        Args:
+            context: the system's own.
+        """
+        return self._estimate(self._images(vector_to_pose(self._pose_port.Eval(context))))
 
     def see(self, context: Any) -> Sightings:
         """Return what the cameras see now.
@@ -128,35 +108,3 @@ class TargetCameras(LeafSystem):
         sightings = self._images(vector_to_pose(pose), noise)
         lost = self._outages.at(context.get_time())
         return sightings.without(list(lost)) if lost else sightings
-
-    def _update(self, context: Any, discrete: Any) -> None:
-        state: Array = context.get_discrete_state_vector().CopyToVector()
-        prior: RigidTransform | None = None
-        if state[_FRAMES] > 0.0:
-            prior = vector_to_pose(state[_POSE])
-        estimate = self._estimate(self.see(context), prior)
-        if estimate is not None:
-            _record(state, estimate)
-        elif prior is None:
-            what = "no pose camera sees a whole pattern of the platform"
-            raise SimulationError("measured pose", context.get_time(), what)
-        else:
-            state[[_TARGETS, _CAMERAS]] = 0.0
-            state[_AGE] += self.sample_time
-            state[_LOST] += 1.0
-        state[_IMAGES_LOST] += self._images.num_cameras - state[_CAMERAS]
-        discrete.set_value(state)
-
-    def _part(self, part: slice) -> Any:
-        def calc(context: Any, output: Any) -> None:
-            output.SetFromVector(context.get_discrete_state_vector().CopyToVector()[part])
-
-        return calc
-
-
-def _record(state: Array, estimate: PoseEstimate) -> None:
-    """Write an estimate into the discrete state."""
-    state[_POSE] = pose_to_vector(estimate.X_WP)
-    state[_COVARIANCE] = estimate.covariance.ravel()
-    state[_FRAMES] += 1.0
-    state[[_TARGETS, _CAMERAS, _AGE]] = estimate.num_targets, estimate.num_cameras, 0.0
