@@ -10,6 +10,7 @@ from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, LeafSy
 from pydrake.systems.primitives import DiscreteTimeDelay, RandomSource, ZeroOrderHold
 
 from cdpr_drake.diagrams.robot import ROBOT_OUTPUTS, make_cable_robot
+from cdpr_drake.model.modelled import MODELLED
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.servo import ServoSettings
 from cdpr_drake.model.vision.outages import Outage
@@ -18,6 +19,8 @@ from cdpr_drake.systems import (
     CameraMeasurement,
     InverseKinematicsAngles,
     LoadCellFilter,
+    ModelledTangents,
+    ModelledTension,
     MotorAngleIntegrator,
     PlausibleTension,
     PoseError,
@@ -45,6 +48,7 @@ def make_vision_based_control(
     sensors: str = "gaussian",
     estimator: str = "joint",
     outages: tuple[Outage, ...] = (),
+    modelled: tuple[str, ...] = (),
     settings: ServoSettings | None = None,
     **servo: Any,
 ) -> Diagram:
@@ -89,6 +93,8 @@ def make_vision_based_control(
             pose cameras, and tangents from the cables' edges in those of the stereo pairs.
         estimator: of the pose from targets, "joint" or "mean" (the paper's).
         outages: when load cells are stuck or dead and, with targets, cameras see nothing.
+        modelled: "tensions" and "tangents" that the law takes from the model at the measured pose:
+            blocks "tension_model" and "tangent_model" instead of the sensors.
         settings: the law's other settings; its cable_model and gain give way to those above.
         servo: fields of ServoSettings (order, ramp_time, max_speed, max_angular_speed,
             model_drum_run), over those of `settings`.
@@ -97,7 +103,7 @@ def make_vision_based_control(
         GeometryError: the cables cannot control all six degrees of freedom.
         RobotFileError: with targets, the robot lacks the cameras or patterns they need.
         ValueError: a gain, period or latency out of range; gain * sample_time >= 1; unknown
-            sensors; targets without sampling or without latency.
+            sensors; targets without sampling or without latency; what cannot be modelled.
     """
     believed = calibrated if calibrated is not None else robot
     k = robot.num_cables
@@ -109,47 +115,63 @@ def make_vision_based_control(
     law = ServoSettings(**{**fields, "cable_model": cable_model, "gain": gain})
     check_sampling(gain, sample_time, latency)
     with_targets = _check_sensors(sensors, sample_time, latency)
+    check_modelled(modelled)
 
     builder = DiagramBuilder()
     plant = builder.AddNamedSystem("robot", make_cable_robot(robot))
+    seeing = CameraMeasurement(robot, believed)
     if with_targets:
         seeing = TargetCameras(robot, believed, sample_time, estimator, outages)
-        pairs = StereoTangentCameras(robot, believed, sample_time, outages)
-    else:
-        seeing, pairs = CameraMeasurement(robot, believed), CableTangentCameras(robot)
     camera = builder.AddNamedSystem("camera", seeing)
-    tangents = builder.AddNamedSystem("tangent_cameras", pairs)
-    cells = builder.AddNamedSystem("load_cells", LoadCellFilter(robot, believed, outages))
+    tangents = cells = None
+    if "tangents" not in modelled:
+        pairs = CableTangentCameras(robot)
+        if with_targets:
+            pairs = StereoTangentCameras(robot, believed, sample_time, outages)
+        tangents = builder.AddNamedSystem("tangent_cameras", pairs)
+    if "tensions" not in modelled:
+        cells = builder.AddNamedSystem("load_cells", LoadCellFilter(robot, believed, outages))
     servo_law = builder.AddNamedSystem("servo", PositionBasedVisualServo(believed, law))
     integrator = builder.AddNamedSystem("integrator", MotorAngleIntegrator(k))
     error = builder.AddNamedSystem("true_error", PoseError(robot))
 
     builder.Connect(plant.GetOutputPort("pose"), camera.GetInputPort("pose"))
-    builder.Connect(
-        plant.GetOutputPort("tangents_at_drawing_point"), tangents.GetInputPort("tangents")
-    )
-    builder.Connect(plant.GetOutputPort("tension_at_winch"), cells.GetInputPort("tension_at_winch"))
     builder.Connect(plant.GetOutputPort("pose"), error.GetInputPort("pose"))
-    measured = {
-        "pose": camera.GetOutputPort("measured_pose"),
-        "tangents": tangents.GetOutputPort("measured_tangents"),
-        "tension": cells.GetOutputPort("measured_tension"),
-    }
+    measured = {"pose": camera.GetOutputPort("measured_pose")}
+    if cells is None:
+        model = builder.AddNamedSystem("tension_model", ModelledTension(believed))
+        builder.Connect(measured["pose"], model.get_input_port())
+        measured["tension"] = model.get_output_port()
+    else:
+        tension = plant.GetOutputPort("tension_at_winch")
+        builder.Connect(tension, cells.GetInputPort("tension_at_winch"))
+        measured["tension"] = cells.GetOutputPort("measured_tension")
+    if tangents is not None:
+        seen = {"tangents": plant.GetOutputPort("tangents_at_drawing_point")}
+        if with_targets:
+            seen["tension_at_drawing_point"] = plant.GetOutputPort("tension_at_drawing_point")
+            seen |= {f"measured_{name}": port for name, port in measured.items()}
+            builder.ExportOutput(tangents.GetOutputPort("valid_tangents"), "valid_tangents")
+            builder.ExportOutput(tangents.GetOutputPort("frames_lost"), "tangent_frames_lost")
+        for name, port in seen.items():
+            builder.Connect(port, tangents.GetInputPort(name))
+        measured["tangents"] = tangents.GetOutputPort("measured_tangents")
     if with_targets:
-        tension = plant.GetOutputPort("tension_at_drawing_point")
-        builder.Connect(tension, tangents.GetInputPort("tension_at_drawing_point"))
-        for name in ("pose", "tension"):
-            builder.Connect(measured[name], tangents.GetInputPort(f"measured_{name}"))
         for name in ("num_targets", "num_cameras", "age", "frames_lost", "images_lost"):
             builder.ExportOutput(camera.GetOutputPort(name), name)
-        builder.ExportOutput(tangents.GetOutputPort("valid_tangents"), "valid_tangents")
-        builder.ExportOutput(tangents.GetOutputPort("frames_lost"), "tangent_frames_lost")
     rates = servo_law.GetOutputPort("motor_rates")
     if sample_time is not None:
         held = {"pose", "tangents"} if with_targets else set()
+        if with_targets and cells is None:
+            held.add("tension")
         measured, rates = _sample(builder, measured, held, rates, sample_time, latency)
     plausible = builder.AddNamedSystem("plausible_tension", PlausibleTension(believed))
     builder.Connect(measured["tension"], plausible.get_input_port())
+    if tangents is None:
+        model = builder.AddNamedSystem("tangent_model", ModelledTangents(believed))
+        builder.Connect(measured["pose"], model.GetInputPort("measured_pose"))
+        builder.Connect(plausible.get_output_port(), model.GetInputPort("measured_tension"))
+        measured["tangents"] = model.GetOutputPort("measured_tangents")
     for name, port in (measured | {"tension": plausible.get_output_port()}).items():
         builder.Connect(port, servo_law.GetInputPort(f"measured_{name}"))
     builder.Connect(rates, integrator.GetInputPort("motor_rates"))
@@ -161,7 +183,9 @@ def make_vision_based_control(
     builder.ExportInput(servo_law.GetInputPort("desired_twist"), "desired_twist")
     builder.ExportInput(plant.GetInputPort("external_wrench"), "external_wrench")
     for name, system in (("pose", camera), ("tangent", tangents), ("tension", cells)):
-        _add_noise(builder, f"{name}_noise", system.GetInputPort("noise"), noise, sample_time)
+        if system is not None:
+            port = system.GetInputPort("noise")
+            _add_noise(builder, f"{name}_noise", port, noise, sample_time)
 
     builder.ExportOutput(servo_law.GetOutputPort("pose_error"), "pose_error_seen")
     builder.ExportOutput(error.GetOutputPort("pose_error"), "pose_error")
@@ -261,6 +285,13 @@ def check_sampling(gain: float, sample_time: float | None, latency: float) -> No
             f"gain * sample time = {gain:g}/s * {sample_time:g} s = {gain * sample_time:.3g} must "
             "be below 1: the loop would overshoot at every sample"
         )
+
+
+def check_modelled(modelled: tuple[str, ...]) -> None:
+    """Raise ValueError unless all that is to be `modelled` can be, and is named once."""
+    for name in modelled:
+        if name not in MODELLED or modelled.count(name) > 1:
+            raise ValueError(f'cannot model "{name}"; known are {", ".join(MODELLED)}')
 
 
 def _check_sensors(sensors: str, sample_time: float | None, latency: float) -> bool:

@@ -72,6 +72,7 @@ class Setup:
         sensors: of VBC, one of `SENSORS`: the truth with Gaussian noise, or what cameras see.
         estimator: of the pose from targets, "joint" or "mean" (the paper's).
         outages: when load cells of VBC fail and, with sensors that see, its cameras.
+        modelled: "tensions" and "tangents" that VBC takes from the model instead of from sensors.
         tensions: those of VBC at the start, "minimum norm" or "within limits" of the robot.
 
     Raises:
@@ -95,6 +96,7 @@ class Setup:
     sensors: str = "gaussian"
     estimator: str = "joint"
     outages: tuple[Outage, ...] = ()
+    modelled: tuple[str, ...] = ()
     tensions: str = "minimum norm"
 
     def __post_init__(self) -> None:
@@ -304,6 +306,7 @@ def _make_loop(setup: Setup) -> Diagram:
             sensors=setup.sensors,
             estimator=setup.estimator,
             outages=setup.outages,
+            modelled=setup.modelled,
             ramp_time=setup.ramp_time,
         )
     loop = make_joint_space_control(

@@ -1,6 +1,7 @@
 """The pieces of the robot and its control: each a Drake LeafSystem.
 
-All are for float and AutoDiffXd, but for the sampled cameras, which OpenCV works for.
+All are for float and AutoDiffXd, but for the sampled cameras, which OpenCV works for, and for what
+stands in for sensors.
 """
 
 from cdpr_drake.systems.cable_force import CatenaryCableForce, CatenaryCableForce_
@@ -17,6 +18,7 @@ from cdpr_drake.systems.joint_space import (
     InverseKinematicsAngles_,
 )
 from cdpr_drake.systems.load_cell import LoadCellFilter, LoadCellFilter_
+from cdpr_drake.systems.modelled import ModelledTangents, ModelledTension
 from cdpr_drake.systems.plausible_tension import PlausibleTension, PlausibleTension_
 from cdpr_drake.systems.servo import (
     MotorAngleIntegrator,
@@ -44,6 +46,8 @@ __all__ = [
     "InverseKinematicsAngles_",
     "LoadCellFilter",
     "LoadCellFilter_",
+    "ModelledTangents",
+    "ModelledTension",
     "MotorAngleIntegrator",
     "MotorAngleIntegrator_",
     "PlausibleTension",
