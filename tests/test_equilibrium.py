@@ -283,6 +283,28 @@ def test_forward_kinematics_with_slack_cables(cogiro: CableRobot) -> None:
     assert np.linalg.eigvalsh(-0.5 * (stiffness + stiffness.T)).min() > 0.0
 
 
+def test_forward_kinematics_anywhere_with_slack_cables(cogiro: CableRobot) -> None:
+    generator = np.random.default_rng(0)
+    slack = 0
+    for _ in range(40):
+        turn = generator.uniform([-0.15, -0.15, -0.4], [0.15, 0.15, 0.4])
+        pose = np.concatenate([turn, generator.uniform([-4.5, -3.0, 0.2], [4.5, 3.0, 3.5])])
+        chords = kinematics.cable_geometry(cogiro, pose).L
+        tension = generator.uniform(50.0, 1500.0, 8)
+        length = (chords + cogiro.cable.drum_run) / (1.0 + tension / cogiro.cable.stiffness(0.0))
+        loose = generator.choice(8, generator.integers(0, 4), replace=False)
+        length[loose] += chords[loose] * generator.uniform(0.02, 0.08, loose.size)
+        found = forward_kinematics(cogiro, length, pose)
+        assert found.residual < 1e-9
+        assert unbalanced(cogiro, found.X_WP, length) < 1e-9
+        R = found.X_WP.rotation().matrix()
+        np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-14)
+        stiffness = equilibrium.platform_balance(cogiro, found.X_WP, length)[1]
+        assert np.linalg.eigvalsh(-0.5 * (stiffness + stiffness.T)).min() > 0.0
+        slack += int(np.sum(found.tension_at_drawing_point < 10.0))
+    assert slack > 20
+
+
 def test_three_cables_hang_somewhere(cogiro: CableRobot) -> None:
     three = few_cables(cogiro, [0, 2, 5])
     length = np.array([9.0, 9.0, 9.5]) + three.cable.drum_run

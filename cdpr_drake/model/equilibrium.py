@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.robot import CableRobot
-from cdpr_drake.model.rotations import Array, as_pose, exp_rotation, skew
+from cdpr_drake.model.rotations import Array, as_pose
 from cdpr_drake.model.statics import check_rank, distribute, wrench_matrix
 
 TOLERANCE = 1e-11
@@ -128,29 +128,17 @@ def platform_balance(
     Raises:
         EquilibriumError: a cable's catenary was not found.
     """
-    from cdpr_drake.model.kernels.catenary import cable_forces_jacobian
+    from cdpr_drake.model.kernels.equilibrium import balance
 
     k = robot.num_cables
-    EB = robot.attachment_points @ X_WP.rotation().matrix().T
     out, jacobian = np.zeros((k, 14)), np.zeros((k, 14, 8))
-    status = cable_forces_jacobian(
-        robot.drawing_points, EB + X_WP.translation(), np.zeros((k, 3)), length, np.zeros(k),
-        robot.weight_per_metre, robot.cable.stiffness.as_array(), robot.cable.drum_run,
-        robot.cable.damping_time, out, jacobian,
+    wrench, stiffness = np.zeros(6), np.zeros((6, 6))
+    status = balance(
+        *_pose_arrays(X_WP), np.array(length, float), *_arrays(robot), out, jacobian, wrench,
+        stiffness,
     )  # fmt: skip
     if status:
         raise EquilibriumError(f"cable {status} has no catenary at this pose and length")
-    force = out[:, :3]
-    weight = gravity_wrench(robot, X_WP)
-    wrench = weight + np.concatenate([np.cross(EB, force).sum(0), force.sum(0)])
-    motion = np.concatenate([-skew(EB), np.broadcast_to(np.eye(3), (k, 3, 3))], axis=2)
-    d_force = jacobian[:, :3, :3] @ motion
-    stiffness = np.zeros((6, 6))
-    stiffness[3:] = d_force.sum(0)
-    stiffness[:3] = (skew(EB) @ d_force).sum(0)
-    stiffness[:3, :3] += (skew(force) @ skew(EB)).sum(0)
-    EG = X_WP.rotation() @ robot.center_of_mass
-    stiffness[:3, :3] += skew(weight[3:]) @ skew(EG)
     return wrench, stiffness, out
 
 
@@ -175,35 +163,41 @@ def forward_kinematics(
         EquilibriumError: no equilibrium was found from this guess; names the residual and the
             cable of least tension.
     """
-    length = np.asarray(length, float)
-    if length.shape != (robot.num_cables,) or not np.all(length > 0.0):
-        raise ValueError(f"lengths must be {robot.num_cables} positive numbers, got {length}")
-    X = as_pose(guess)
-    wrench, stiffness, out = platform_balance(robot, X, length)
-    for _ in range(max_iterations):
-        if _relative(robot, wrench) <= TOLERANCE:
-            break
-        step = _descent_step(stiffness, wrench)
-        fraction, descent = 1.0, float(step @ wrench)
-        for _ in range(30):
-            candidate = _moved(X, fraction * step)
-            trial = platform_balance(robot, candidate, length)
-            ahead = float(step @ trial[0])
-            if abs(ahead) <= 0.5 * descent or ahead > 0.0:
-                break
-            # Beyond the lowest point along the step: go back by the secant of the slope.
-            fraction *= max(0.1, descent / (descent - ahead))
-        if np.linalg.norm(fraction * step) < 1e-14:
-            break  # round-off of stiff cables
-        X, (wrench, stiffness, out) = candidate, trial
-    residual = _relative(robot, wrench)
+    from cdpr_drake.model.kernels.equilibrium import find_equilibrium
+
+    k = robot.num_cables
+    length = np.array(length, float)
+    if length.shape != (k,) or not np.all(length > 0.0):
+        raise ValueError(f"lengths must be {k} positive numbers, got {length}")
+    R, p = _pose_arrays(as_pose(guess))
+    out, jacobian, wrench = np.zeros((k, 14)), np.zeros((k, 14, 8)), np.zeros(6)
+    status, residual = find_equilibrium(
+        R, p, length, *_arrays(robot), TOLERANCE, max_iterations, out, jacobian, wrench
+    )
+    if status:
+        raise EquilibriumError(f"cable {status} has no catenary at this pose and length")
     if not residual <= 1e3 * TOLERANCE:
         slackest = int(np.argmin(out[:, 3]))
         raise EquilibriumError(
             f"no equilibrium for these lengths: residual {residual:.2e} of the weight; limiting "
             f"cable {slackest + 1} ({out[slackest, 3]:.2f} N at the drawing point)"
         )
-    return _state(robot, X, length, out, residual)
+    return _state(robot, RigidTransform(RotationMatrix(R), p), length, out, residual)
+
+
+def _pose_arrays(X_WP: RigidTransform) -> tuple[Array, Array]:
+    """Return rotation (3, 3) and translation (3,) of a pose, to be written to."""
+    return np.array(X_WP.rotation().matrix(), order="C"), np.array(X_WP.translation())
+
+
+def _arrays(robot: CableRobot) -> tuple[Array, Array, Array]:
+    """Return points, constants and body as the kernels of equilibria take them."""
+    cable = robot.cable
+    points = np.array([robot.drawing_points, robot.attachment_points], float)
+    scalars = [cable.damping_time, cable.breaking_load]
+    law = cable.stiffness.as_array()
+    constants = np.array([robot.weight_per_metre, *law, *scalars, *cable.drum_run], float)
+    return points, constants, np.array([robot.mass * robot.gravity, *robot.center_of_mass], float)
 
 
 def _state(
@@ -218,19 +212,6 @@ def _state(
         tension_at_attachment_point=out[:, 4],
         residual=residual,
     )
-
-
-def _descent_step(stiffness: Array, wrench: Array) -> Array:
-    """Return a motion [rotation; translation] that lowers the energy, limited in size."""
-    values, vectors = np.linalg.eigh(-0.5 * (stiffness + stiffness.T))
-    values = np.maximum(np.abs(values), 1e-9 * np.abs(values).max())
-    step = vectors @ ((vectors.T @ wrench) / values)
-    return step / max(1.0, np.linalg.norm(step[:3]) / 0.3, np.linalg.norm(step[3:]) / 1.0)
-
-
-def _moved(X: RigidTransform, step: Array) -> RigidTransform:
-    R = RotationMatrix.ProjectToRotationMatrix(exp_rotation(step[:3]) @ X.rotation().matrix())
-    return RigidTransform(R, X.translation() + step[3:])
 
 
 def _relative(robot: CableRobot, wrench: Array) -> float:
