@@ -127,7 +127,7 @@ def _processor() -> str:
 
 def number(value: float) -> str:
     """Return a number as the tables show it."""
-    if value == 0.0 or 0.1 <= abs(value) < 1e5:
+    if value == 0.0 or 1e-3 <= abs(value) < 1e6:
         return f"{value:.3g}" if abs(value) < 1e3 else f"{value:.0f}"
     return f"{value:.1e}"
 
