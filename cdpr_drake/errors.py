@@ -30,6 +30,14 @@ class EquilibriumError(CdprError, RuntimeError):
     """No equilibrium was found; the message gives the residual and the limiting cable."""
 
 
+class CalibrationError(CdprError, ValueError):
+    """Measurements do not determine what they shall calibrate; the message says why."""
+
+
+class RenderingError(CdprError, RuntimeError):
+    """Images cannot be rendered on this machine; the message says why."""
+
+
 class LinearizationError(CdprError, ValueError):
     """A diagram cannot be linearised; the message names the block in the way."""
 
@@ -58,3 +66,7 @@ class SimulationError(CdprError, RuntimeError):
 
     def __reduce__(self):
         return type(self), (self.quantity, self.time, self.message)
+
+
+class SweepError(CdprError, RuntimeError):
+    """A sweep came to no end; the message says why. What it had done is kept in its folder."""

@@ -1,0 +1,113 @@
+"""Nonlinear least squares in double precision, with the covariance of what it finds.
+
+Written for bundles of images: the parameters are moved, not added to, and each block of residuals
+depends on few of them, so that only the normal equations are large.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cdpr_drake.errors import CalibrationError
+from cdpr_drake.model.rotations import Array
+
+State = TypeVar("State")
+Block = tuple[Array, Array, NDArray[np.intp]]
+"""Residuals (m,) over their standard deviations, their derivatives (m, q), the q parameters."""
+
+MOST_STEPS = 100
+CONVERGED = 1e-9  # of a step, in standard deviations of each parameter alone
+ROUNDING = 1e-12  # of the cost, promised by a step that rounding hides
+SMALLEST = 1e-18  # the same where the cost is zero
+LEAST_INFORMATION = 1e-11  # smallest eigenvalue of the normal matrix scaled to a unit diagonal
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fit(Generic[State]):
+    """What least squares found.
+
+    Attributes:
+        state: where the residuals are least.
+        covariance: (p, p), of the p parameters, as the residuals' standard deviations predict it.
+        cost: sum of squares of the residuals.
+        freedom: number of residuals less the parameters: what the cost should be, on average.
+    """
+
+    state: State
+    covariance: Array
+    cost: float
+    freedom: int
+
+
+def minimise(
+    state: State,
+    blocks: Callable[[State], Iterable[Block]],
+    move: Callable[[State, Array], State],
+    names: Sequence[str],
+) -> Fit[State]:
+    """Return the state of least squares, by Levenberg and Marquardt's method.
+
+    Args:
+        state: where to start.
+        blocks: gives the residuals at a state.
+        move: gives a state moved by a step (p,).
+        names: of the p parameters, for errors.
+
+    Raises:
+        CalibrationError: the residuals do not determine a parameter, or there is no convergence.
+    """
+    size, damping = len(names), 1e-3
+    N, g, cost, count = _normal_equations(blocks(state), size)
+    for _ in range(MOST_STEPS):
+        scale = _scale(N, names)
+        scaled, slope = N / np.outer(scale, scale), g / scale
+        step = np.linalg.solve(scaled + damping * np.eye(size), slope)
+        promised = float(step @ slope)
+        if np.abs(step).max() < CONVERGED or promised < ROUNDING * cost + SMALLEST:
+            covariance = _covariance(scaled, names) / np.outer(scale, scale)
+            return Fit(state=state, covariance=covariance, cost=cost, freedom=count - size)
+        trial = move(state, step / scale)
+        new = _normal_equations(blocks(trial), size)
+        if new[2] <= cost:
+            state, (N, g, cost, _), damping = trial, new, max(0.1 * damping, 1e-12)
+        else:
+            damping *= 10.0
+    raise CalibrationError(
+        f"no convergence in {MOST_STEPS} steps: the measurements contradict each other, or are "
+        "too few"
+    )
+
+
+def _normal_equations(blocks: Iterable[Block], size: int) -> tuple[Array, Array, float, int]:
+    N, g, cost, count = np.zeros((size, size)), np.zeros(size), 0.0, 0
+    for r, J, columns in blocks:
+        N[np.ix_(columns, columns)] += J.T @ J
+        g[columns] -= J.T @ r
+        cost += float(r @ r)
+        count += r.size
+    return N, g, cost if np.isfinite(cost) else np.inf, count
+
+
+def _scale(N: Array, names: Sequence[str]) -> Array:
+    """Return what scales the normal matrix to a unit diagonal."""
+    diagonal = np.diag(N)
+    if not np.all(np.isfinite(diagonal)):
+        raise CalibrationError("the measurements cannot be explained at all: a point is behind a "
+                               "camera")  # fmt: skip
+    if not np.all(diagonal > 0.0):
+        raise CalibrationError(f"nothing depends on {names[int(np.argmin(diagonal))]}")
+    return np.sqrt(diagonal)
+
+
+def _covariance(scaled: Array, names: Sequence[str]) -> Array:
+    values, vectors = np.linalg.eigh(scaled)
+    if values[0] < LEAST_INFORMATION:
+        most = int(np.argmax(np.abs(vectors[:, 0])))
+        raise CalibrationError(f"the measurements do not determine {names[most]}")
+    inverse: Array = (vectors / values) @ vectors.T
+    return inverse
