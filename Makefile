@@ -52,8 +52,8 @@ clean: ## remove the virtual environments, what was built, and caches
 
 # A set of extras that contains another vouches for it.
 $(INSTALLED)-demo: EXTRAS := fast
-$(INSTALLED)-test: EXTRAS := fast,test,notebook
-$(INSTALLED)-dev: EXTRAS := fast,test,notebook,dev
+$(INSTALLED)-test: EXTRAS := fast,test,notebook,cluster
+$(INSTALLED)-dev: EXTRAS := fast,test,notebook,cluster,dev
 $(INSTALLED)-bench: EXTRAS := fast,bench
 
 $(INSTALLED)-demo: pyproject.toml

@@ -82,12 +82,19 @@ def has_jupyter() -> bool:
     return all(importlib.util.find_spec(name) for name in ("nbformat", "nbclient", "ipykernel"))
 
 
+@cache
+def has_distributed() -> bool:
+    """Whether there is Dask for a cluster."""
+    return importlib.util.find_spec("distributed") is not None
+
+
 # For `@pytest.mark.needs(name)`: the probe, run only when a test asks, and the reason to skip.
 NEEDS: dict[str, tuple[Callable[[], bool], str]] = {
     "numba": (has_numba, "numba is not installed (the `fast` extra)"),
     "chromium": (has_chromium, "no Chromium or Chrome that starts"),
     "egl": (has_egl, "no EGL driver, so Drake cannot render without a display"),
     "graphviz": (has_graphviz, "graphviz' `dot` is not installed"),
+    "distributed": (has_distributed, "distributed is not installed (the `cluster` extra)"),
     "jupyter": (has_jupyter, "nbclient or ipykernel is not installed (the `notebook` extra)"),
 }
 

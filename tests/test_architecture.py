@@ -25,6 +25,7 @@ PACKAGE = ROOT / "cdpr_drake"
 # A module imports only from its own layer and from lower ones.
 LAYERS = {
     "errors": 0,
+    "batch": 0,
     "model": 1,
     "systems": 2,
     "diagrams": 3,

@@ -38,6 +38,7 @@ from cdpr_drake.study.stability import (
     warn_if_unstable,
 )
 from cdpr_drake.study.state_space import StateSpace
+from cdpr_drake.study.sweep import Outcome, Sweep, sweep
 
 __all__ = [
     "Comparison",
@@ -51,6 +52,7 @@ __all__ = [
     "Modes",
     "NeutralDirections",
     "OnePeriodMap",
+    "Outcome",
     "Residuals",
     "ResponseMetrics",
     "SampledServo",
@@ -58,6 +60,7 @@ __all__ = [
     "StabilityMap",
     "StabilityWarning",
     "StateSpace",
+    "Sweep",
     "comparable_pose",
     "compare_cable_models",
     "equilibrium",
@@ -82,6 +85,7 @@ __all__ = [
     "simulated_period_map",
     "stability_map",
     "step_response",
+    "sweep",
     "true_pose",
     "warn_if_unstable",
 ]
