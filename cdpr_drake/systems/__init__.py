@@ -29,6 +29,7 @@ from cdpr_drake.systems.servo import (
     PositionBasedVisualServo_,
 )
 from cdpr_drake.systems.stereo import StereoTangentCameras
+from cdpr_drake.systems.stereo_images import StereoImageCameras
 from cdpr_drake.systems.targets import TargetCameras
 from cdpr_drake.systems.winch import WinchDynamics, WinchDynamics_
 from cdpr_drake.systems.zero_when_open import ZeroWhenOpen, ZeroWhenOpen_
@@ -56,6 +57,7 @@ __all__ = [
     "PoseError_",
     "PositionBasedVisualServo",
     "PositionBasedVisualServo_",
+    "StereoImageCameras",
     "StereoTangentCameras",
     "TargetCameras",
     "WinchDynamics",

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from pydrake.common import RandomDistribution
+from pydrake.math import RigidTransform
 from pydrake.systems.framework import LeafSystem
 
 from cdpr_drake.model.robot import CableRobot
@@ -15,7 +16,128 @@ from cdpr_drake.model.vision.tangents import CableImages, TangentEstimate, Tange
 from cdpr_drake.systems._template import GAUSSIAN_INPUT, check_finite
 
 
-class StereoTangentCameras(LeafSystem):
+class StereoCameras(LeafSystem):
+    """What all systems share that sample the cables' directions by stereo pairs.
+
+    One of them says what edges its cameras see, `_edges`.
+
+    Args:
+        robot: the true robot.
+        calibrated: the robot as the controller believes it; the true one if None.
+        sample_time: period T [s]; that of the robot's cameras if None.
+        outages: when pairs see nothing.
+        noise_size: of the noise port.
+
+    Raises:
+        RobotFileError: a cable is seen by no stereo pair, or by two.
+        ValueError: an outage of a pair that is not there.
+    """
+
+    def __init__(
+        self,
+        robot: CableRobot,
+        calibrated: CableRobot | None,
+        sample_time: float | None,
+        outages: tuple[Outage, ...],
+        noise_size: int,
+    ) -> None:
+        super().__init__()
+        self.robot = robot
+        self.calibrated = calibrated if calibrated is not None else robot
+        self.sample_time = robot.cameras.sample_time if sample_time is None else sample_time
+        self._estimate = TangentEstimator(self.calibrated)
+        self._outages = Outages(outages, STEREO_PAIR, len(robot.cameras.stereo_pairs))
+        k = self._k = robot.num_cables
+        self._tangents_port = self.DeclareVectorInputPort("tangents", 3 * k)
+        self._tension_port = self.DeclareVectorInputPort("tension_at_drawing_point", k)
+        self._pose_port = self.DeclareVectorInputPort("measured_pose", 6)
+        self._measured_tension_port = self.DeclareVectorInputPort("measured_tension", k)
+        self._noise_port = self.DeclareVectorInputPort(
+            GAUSSIAN_INPUT, noise_size, RandomDistribution.kGaussian
+        )
+        self.DeclareDiscreteState(6 * k)
+        self.DeclarePeriodicDiscreteUpdateEvent(self.sample_time, 0.0, self._update)
+        start = 0
+        for name, size in (
+            ("measured_tangents", 3 * k),
+            ("valid_tangents", k),
+            ("curvature_bias", k),
+            ("frames_lost", k),
+        ):
+            part = self._part(slice(start, start + size))
+            self.DeclareVectorOutputPort(name, size, part, {self.xd_ticket()})
+            start += size
+
+    def set_at_rest(self, context: Any) -> None:
+        """Make the held directions what all pairs see now without noise.
+
+        Args:
+            context: the system's own, changed.
+        """
+        state = np.zeros(6 * self._k)
+        edges = self._edges(context, state, None, set())
+        context.SetDiscreteState(self._state(context, state, self._measure(context, edges)))
+
+    def _edges(self, context: Any, state: Array, noise: Array | None, lost: set[int]) -> Array:
+        """Return what pairs that are not lost see of the edges (k, 2, 2, n, 2) [px]."""
+        raise NotImplementedError
+
+    def _noise(self, context: Any) -> Array | None:
+        """Return the noise now, None if the port is left open."""
+        if not self._noise_port.HasValue(context):
+            return None
+        noise = self._noise_port.Eval(context)
+        check_finite(noise, self, context, "noise")
+        return noise
+
+    def _lost(self, context: Any) -> set[int]:
+        """Return the pairs that fail now, by index from 0."""
+        return set(self._outages.at(context.get_time()))
+
+    def _cables(self, context: Any) -> tuple[Array, Array]:
+        tangents, tension = self._tangents_port.Eval(context), self._tension_port.Eval(context)
+        check_finite(np.append(tangents, tension), self, context, "inputs")
+        return tangents, tension
+
+    def _measured(self, context: Any) -> tuple[Array, RigidTransform]:
+        tension, pose = self._measured_tension_port.Eval(context), self._pose_port.Eval(context)
+        check_finite(np.append(pose, tension), self, context, "inputs")
+        return tension, vector_to_pose(pose)
+
+    def _measure(self, context: Any, edges: Array) -> TangentEstimate:
+        return self._estimate(edges, *self._measured(context))
+
+    def _update(self, context: Any, discrete: Any) -> None:
+        state = context.get_discrete_state_vector().CopyToVector()
+        edges = self._edges(context, state, self._noise(context), self._lost(context))
+        discrete.set_value(self._state(context, state, self._measure(context, edges)))
+
+    def _state(self, context: Any, state: Array, estimate: TangentEstimate) -> Array:
+        """Return the state after an estimate, what is not valid in it held from the state before.
+
+        A cable that was never seen is taken for straight.
+        """
+        k, valid = self._k, estimate.valid
+        held, bias = state[: 3 * k].reshape(-1, 3), state[4 * k : 5 * k]
+        if not np.all(valid | held.any(axis=1)):
+            X_WP = vector_to_pose(self._pose_port.Eval(context))
+            chords = self.calibrated.attachment_points @ X_WP.rotation().matrix().T
+            chords = chords + X_WP.translation() - self.calibrated.drawing_points
+            straight = chords / np.linalg.norm(chords, axis=1, keepdims=True)
+            held = np.where(held.any(axis=1, keepdims=True), held, straight)
+        tangents = np.where(valid[:, None], estimate.tangents, held)
+        bias = np.where(valid, estimate.curvature_bias, bias)
+        lost = state[5 * k :] + ~valid
+        return np.concatenate([tangents.ravel(), valid, bias, lost])
+
+    def _part(self, part: slice) -> Any:
+        def calc(context: Any, output: Any) -> None:
+            output.SetFromVector(context.get_discrete_state_vector().CopyToVector()[part])
+
+        return calc
+
+
+class StereoTangentCameras(StereoCameras):
     """The cables' directions at their drawing points, as sampled by the stereo pairs.
 
     .. pydrake_system::
@@ -61,42 +183,8 @@ class StereoTangentCameras(LeafSystem):
         sample_time: float | None = None,
         outages: tuple[Outage, ...] = (),
     ) -> None:
-        super().__init__()
-        self.robot = robot
-        self.calibrated = calibrated if calibrated is not None else robot
-        self.sample_time = robot.cameras.sample_time if sample_time is None else sample_time
         self._images = CableImages(robot)
-        self._estimate = TangentEstimator(self.calibrated)
-        self._outages = Outages(outages, STEREO_PAIR, len(robot.cameras.stereo_pairs))
-        k = self._k = robot.num_cables
-        self._tangents_port = self.DeclareVectorInputPort("tangents", 3 * k)
-        self._tension_port = self.DeclareVectorInputPort("tension_at_drawing_point", k)
-        self._pose_port = self.DeclareVectorInputPort("measured_pose", 6)
-        self._measured_tension_port = self.DeclareVectorInputPort("measured_tension", k)
-        self._noise_port = self.DeclareVectorInputPort(
-            GAUSSIAN_INPUT, self._images.noise_size, RandomDistribution.kGaussian
-        )
-        self.DeclareDiscreteState(6 * k)
-        self.DeclarePeriodicDiscreteUpdateEvent(self.sample_time, 0.0, self._update)
-        start = 0
-        for name, size in (
-            ("measured_tangents", 3 * k),
-            ("valid_tangents", k),
-            ("curvature_bias", k),
-            ("frames_lost", k),
-        ):
-            part = self._part(slice(start, start + size))
-            self.DeclareVectorOutputPort(name, size, part, {self.xd_ticket()})
-            start += size
-
-    def set_at_rest(self, context: Any) -> None:
-        """Make the held directions what all pairs see now without noise.
-
-        Args:
-            context: the system's own, changed.
-        """
-        estimate = self._measure(context, self._images(*self._cables(context)))
-        context.SetDiscreteState(self._state(context, np.zeros(6 * self._k), estimate))
+        super().__init__(robot, calibrated, sample_time, outages, self._images.noise_size)
 
     def see(self, context: Any) -> Array:
         """Return the images (k, 2, 2, n, 2) [px] of the cables now, NaN where not seen.
@@ -104,50 +192,9 @@ class StereoTangentCameras(LeafSystem):
         Args:
             context: the system's own.
         """
-        noise = self._noise_port.Eval(context) if self._noise_port.HasValue(context) else None
-        if noise is not None:
-            check_finite(noise, self, context, "noise")
+        return self._edges(context, np.empty(0), self._noise(context), self._lost(context))
+
+    def _edges(self, context: Any, state: Array, noise: Array | None, lost: set[int]) -> Array:
         images = self._images(*self._cables(context), noise)
-        for pair in self._outages.at(context.get_time()):
-            images[self._images.pairs == pair] = np.nan
+        images[np.isin(self._images.pairs, list(lost))] = np.nan
         return images
-
-    def _cables(self, context: Any) -> tuple[Array, Array]:
-        tangents, tension = self._tangents_port.Eval(context), self._tension_port.Eval(context)
-        check_finite(np.append(tangents, tension), self, context, "inputs")
-        return tangents, tension
-
-    def _measure(self, context: Any, images: Array) -> TangentEstimate:
-        tension = self._measured_tension_port.Eval(context)
-        pose = self._pose_port.Eval(context)
-        check_finite(np.append(pose, tension), self, context, "inputs")
-        return self._estimate(images, tension, vector_to_pose(pose))
-
-    def _update(self, context: Any, discrete: Any) -> None:
-        state = context.get_discrete_state_vector().CopyToVector()
-        estimate = self._measure(context, self.see(context))
-        discrete.set_value(self._state(context, state, estimate))
-
-    def _state(self, context: Any, state: Array, estimate: TangentEstimate) -> Array:
-        """Return the state after an estimate, what is not valid in it held from the state before.
-
-        A cable that was never seen is taken for straight.
-        """
-        k, valid = self._k, estimate.valid
-        held, bias = state[: 3 * k].reshape(-1, 3), state[4 * k : 5 * k]
-        if not np.all(valid | held.any(axis=1)):
-            X_WP = vector_to_pose(self._pose_port.Eval(context))
-            chords = self.calibrated.attachment_points @ X_WP.rotation().matrix().T
-            chords = chords + X_WP.translation() - self.calibrated.drawing_points
-            straight = chords / np.linalg.norm(chords, axis=1, keepdims=True)
-            held = np.where(held.any(axis=1, keepdims=True), held, straight)
-        tangents = np.where(valid[:, None], estimate.tangents, held)
-        bias = np.where(valid, estimate.curvature_bias, bias)
-        lost = state[5 * k :] + ~valid
-        return np.concatenate([tangents.ravel(), valid, bias, lost])
-
-    def _part(self, part: slice) -> Any:
-        def calc(context: Any, output: Any) -> None:
-            output.SetFromVector(context.get_discrete_state_vector().CopyToVector()[part])
-
-        return calc

@@ -41,8 +41,26 @@ class TangentEstimate:
     curvature_bias: Array
 
 
-class _Stereo:
-    """The cables of a robot and, for each, the two cameras that see it, packed for the kernels."""
+class StereoGeometry:
+    """The cables of a robot and, for each, the two cameras that see it, packed for the kernels.
+
+    Attributes:
+        robot: the robot.
+        pairs: (k,), the index of the stereo pair that sees each cable.
+        lefts: (k, 21), its left cameras, packed.
+        rights: (k, 21), its right cameras, packed.
+        sizes: (k, 2, 2) [px], width and height of left and right images.
+        stations: (n,) [m], where edges are looked at, from the drawing point along the cable.
+        radius: of the cable [m].
+        drawing: (k, 3) [m], the drawing points.
+        shape: (k, 2, 2, n), of what is seen: by cable, camera, edge and station.
+
+    Args:
+        robot: the robot.
+
+    Raises:
+        RobotFileError: a cable is seen by no stereo pair, or by two.
+    """
 
     def __init__(self, robot: CableRobot) -> None:
         from cdpr_drake.model.kernels import stereo as kernel
@@ -50,7 +68,8 @@ class _Stereo:
         self.kernel = kernel
         self.robot = robot
         setup = robot.cameras
-        pairs = [setup.stereo_pairs[i] for i in observers(robot)]
+        self.pairs = observers(robot)
+        pairs = [setup.stereo_pairs[i] for i in self.pairs]
         X_WL = [setup.X_WF @ pair.X_FL for pair in pairs]
         self.lefts = np.array([pack_camera(X, p.left) for X, p in zip(X_WL, pairs, strict=True)])
         self.rights = np.array(
@@ -66,8 +85,30 @@ class _Stereo:
         self.shape = (robot.num_cables, 2, 2, setup.edge_points)
 
     def stiffness(self, tension: Array) -> Array:
-        """Return EA (k,) [N] at tensions (k,) [N]."""
+        """Return EA (k,) [N] at tensions (k,) [N], at the drawing points.
+
+        Args:
+            tension: those.
+        """
         return np.broadcast_to(self.robot.cable.stiffness(tension), tension.shape).copy()
+
+    def believable(self, tension: ArrayLike) -> Array:
+        """Return measured tensions (k,) [N], those of dead load cells raised to a floor.
+
+        Args:
+            tension: (k,) [N].
+        """
+        floor = LEAST_TENSION * self.robot.cable.min_tension + 1e-3
+        return np.maximum(np.asarray(tension, float), floor)
+
+    def chords(self, X_WP: RigidTransform) -> Array:
+        """Return the vectors (k, 3) [m] from drawing to attachment points, in W.
+
+        Args:
+            X_WP: pose of the platform.
+        """
+        ends = self.robot.attachment_points @ X_WP.rotation().matrix().T + X_WP.translation()
+        return ends - self.drawing
 
 
 class CableImages:
@@ -85,9 +126,9 @@ class CableImages:
     """
 
     def __init__(self, robot: CableRobot) -> None:
-        self._stereo = _Stereo(robot)
+        self._stereo = StereoGeometry(robot)
         self._sigma = robot.cameras.line_noise
-        self.pairs = observers(robot)
+        self.pairs = self._stereo.pairs
 
     @property
     def noise_size(self) -> int:
@@ -136,8 +177,7 @@ class TangentEstimator:
     """
 
     def __init__(self, robot: CableRobot) -> None:
-        self._stereo = _Stereo(robot)
-        self._floor = LEAST_TENSION * robot.cable.min_tension + 1e-3
+        self._stereo = StereoGeometry(robot)
 
     def __call__(self, images: Array, tension: ArrayLike, X_WP: RigidTransform) -> TangentEstimate:
         """Return the tangents.
@@ -149,9 +189,8 @@ class TangentEstimator:
         """
         s = self._stereo
         k = len(s.drawing)
-        chords = s.robot.attachment_points @ X_WP.rotation().matrix().T + X_WP.translation()
-        chords = chords - s.drawing
-        T = np.maximum(np.asarray(tension, float), self._floor)
+        chords = s.chords(X_WP)
+        T = s.believable(tension)
         tangents, sines, bias = np.zeros((k, 3)), np.empty(k), np.empty(k)
         s.kernel.measure(
             np.ascontiguousarray(images), chords, s.drawing, T, s.robot.weight_per_metre,
