@@ -66,6 +66,10 @@ def dispatch(options: Namespace) -> int:
             from cdpr_drake.commands.coupling import coupling_command
 
             return coupling_command(options)
+        if options.command == "calibrate":
+            from cdpr_drake.commands.calibrate import calibrate_command
+
+            return calibrate_command(options)
         from cdpr_drake.commands.run import run_command
 
         return run_command(options)

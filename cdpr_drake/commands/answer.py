@@ -53,6 +53,7 @@ def leave(
     summary: dict[str, Any],
     lines: Iterable[str],
     figures: Figures,
+    texts: Mapping[str, str] | None = None,
 ) -> int:
     """Write summary and figures, print the answer or its JSON, and return the exit status.
 
@@ -62,6 +63,7 @@ def leave(
         summary: plain values; gains "cdpr_drake", "drake" and "files".
         lines: of the answer.
         figures: makes the figures, by the names of their files without ".png".
+        texts: other files, by their names.
 
     Raises:
         UsageError: the directory cannot be used.
@@ -74,6 +76,9 @@ def leave(
                 for file, figure in figures().items():
                     figure.savefig(folder / f"{file}.png", dpi=DOTS_PER_INCH)
                     summary["files"].append(f"{file}.png")
+            for file, text in (texts or {}).items():
+                (folder / file).write_text(text, encoding="utf-8")
+                summary["files"].append(file)
             write_summary(folder / SUMMARY, summary)
     except OSError as error:
         raise UsageError(f"--output {directory}: {error.strerror or error}") from error

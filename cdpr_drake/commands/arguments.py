@@ -93,6 +93,9 @@ def _build_parser() -> argparse.ArgumentParser:
     from cdpr_drake.commands.study_arguments import add_study_commands  # imports this module
 
     add_study_commands(commands)
+    from cdpr_drake.commands.calibrate_arguments import add_calibrate
+
+    add_calibrate(commands)
     commands.add_parser(
         "robots",
         help="list the built-in robots",
@@ -156,6 +159,11 @@ def _add_run(commands: argparse._SubParsersAction[_Parser]) -> None:
     how.add_argument(
         "--estimator", default="joint", metavar="KIND",
         help="of the pose from targets: joint, over all images; mean, the paper's (default: joint)",
+    )  # fmt: skip
+    how.add_argument(
+        "--calibrated", metavar="NAME|FILE",
+        help="the robot as the controllers believe it, as `calibrate` writes it; start and goal "
+        "are the true robot's, in W (default: the true robot)",
     )  # fmt: skip
     how.add_argument("--no-noise", action="store_true", help="perfect cameras and load cells")
     how.add_argument("--seed", type=int, default=0, metavar="N", help="of the noise (default: 0)")

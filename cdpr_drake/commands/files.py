@@ -18,7 +18,7 @@ from cdpr_drake.commands.terminal import say
 from cdpr_drake.diagrams import Record
 
 SUMMARY = "summary.json"
-SUFFIXES = (".csv", ".html", ".json", ".pdf", ".png", ".svg")
+SUFFIXES = (".csv", ".html", ".json", ".pdf", ".png", ".svg", ".yaml")
 
 _POSE = ("roll [rad]", "pitch [rad]", "yaw [rad]", "x [m]", "y [m]", "z [m]")
 _ERROR = ("s_wx [rad]", "s_wy [rad]", "s_wz [rad]", "s_tx [m]", "s_ty [m]", "s_tz [m]")

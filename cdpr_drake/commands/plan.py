@@ -15,7 +15,7 @@ from cdpr_drake.experiments import Prepared, Setup, paper_test
 from cdpr_drake.experiments.moves import move_near_the_middle
 from cdpr_drake.experiments.paper_tests import paper_tests
 from cdpr_drake.model.cable_models import CABLE_MODELS
-from cdpr_drake.model.robot import load_robot
+from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.servo import pose_error
 
 DEFAULT_TEST = 4
@@ -61,6 +61,8 @@ def plan(options: argparse.Namespace) -> tuple[str, list[Setup]]:
     if values["sample_time"] == 0.0:
         values["sample_time"] = None
 
+    if options.calibrated is not None:
+        values["calibrated"] = _believed(options.calibrated, robot)
     setups = []
     if options.controller in ("vbc", "both"):
         models = dict.fromkeys(options.cable_model or DEFAULT_MODELS)
@@ -73,6 +75,15 @@ def plan(options: argparse.Namespace) -> tuple[str, list[Setup]]:
     is_test = number is not None and options.start is None and options.goal is None
     name = f"test-{number}" if is_test else re.sub(r"[^\w.-]+", "-", robot.name).strip(".-")
     return name or "run", setups
+
+
+def _believed(name: str, robot: CableRobot) -> CableRobot:
+    """Return the robot as the controllers believe it, with what the true robot carries."""
+    believed = load_robot(name)
+    if believed.num_cables != robot.num_cables:
+        cables = f"{believed.num_cables} cables, the true robot {robot.num_cables}"
+        raise ValueError(f"--calibrated {name}: has {cables}")
+    return believed.replace(payload=robot.payload)
 
 
 def warn_of_low_tensions(ready: Sequence[Prepared]) -> None:

@@ -1,6 +1,7 @@
 """What a run looks like: figures, block diagrams, and replays that a browser plays."""
 
 from cdpr_drake.show.block_diagram import GraphvizError, block_diagram, block_diagram_dot
+from cdpr_drake.show.calibration_plots import calibration_figure
 from cdpr_drake.show.mode_plots import mode_shape_figure, pole_figure, stability_figure
 from cdpr_drake.show.plots import (
     cable_sag,
@@ -21,6 +22,7 @@ __all__ = [
     "block_diagram",
     "block_diagram_dot",
     "cable_sag",
+    "calibration_figure",
     "error_norm_figure",
     "gain_map_figure",
     "mode_shape_figure",
