@@ -61,6 +61,57 @@ class Claim:
     reason: str = ""
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Line:
+    """A line of a panel.
+
+    Args:
+        label: what it is, for the legend; "" for none.
+        x: (n,).
+        y: (n,).
+        colour: which colour, counting from 0; lines of one kind share it across panels.
+        dash: which dashes, counting from 0, the first being none.
+    """
+
+    label: str
+    x: Any
+    y: Any
+    colour: int = 0
+    dash: int = 0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Panel:
+    """One pair of axes of a figure.
+
+    Args:
+        title: what it shows.
+        y_label: quantity and unit.
+        lines: to draw.
+        x_label: quantity and unit.
+    """
+
+    title: str
+    y_label: str
+    lines: tuple[Line, ...]
+    x_label: str = "time [s]"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Figure:
+    """A figure to look at.
+
+    Args:
+        title: what it shows.
+        panels: row by row, all rows of one length.
+        caption: what one has to know to read it.
+    """
+
+    title: str
+    panels: tuple[tuple[Panel, ...], ...]
+    caption: str = ""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Section:
     """A table or figure of the paper, made again.
@@ -72,6 +123,7 @@ class Section:
         tables: to read.
         claims: of the paper.
         fitted: each value that was fitted or assumed, by its name in the file of assumptions.
+        figures: to look at.
     """
 
     name: str
@@ -80,6 +132,7 @@ class Section:
     tables: tuple[Table, ...] = ()
     claims: tuple[Claim, ...] = ()
     fitted: Mapping[str, Any] = field(default_factory=dict)
+    figures: tuple[Figure, ...] = ()
 
 
 class Reproduction(Protocol):
