@@ -159,6 +159,7 @@ BAD = [
         "all lie on one line",
     ),
     (change(["patterns", 0, "points"], [[0, 0, 0]] * 4), "patterns[0].points", "shape (n, 2)"),
+    (change(["patterns", 2, "point_diameter"], 0.0), "patterns[2].point_diameter", "be positive"),
     (
         change(["stereo_pairs", 1, "X_LR", "translation"], [0, 0, 0]),
         "stereo_pairs[1].X_LR",

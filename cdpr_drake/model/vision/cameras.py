@@ -59,10 +59,12 @@ class Pattern(Record):
         X_MT: pose of the pattern's frame T in the target frame M; its z axis points away from the
             platform, which is convex: what hides a pattern is the face it is on.
         points: (n, 2) [m], at least four, x and y in T.
+        point_diameter: [m], of a point: a white disc on the dark face.
     """
 
     X_MT: RigidTransform
     points: np.ndarray
+    point_diameter: float = 0.1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -98,6 +100,8 @@ def camera_problems(cameras: Cameras) -> Problems:
         where = f"cameras.patterns[{index}]"
         yield from _transform(f"{where}.X_MT", pattern.X_MT)
         yield from _points(f"{where}.points", pattern.points)
+        if not 0.0 < pattern.point_diameter < np.inf:
+            yield f"{where}.point_diameter", f"must be positive, got {pattern.point_diameter}"
     for index, pair in enumerate(cameras.stereo_pairs):
         where = f"cameras.stereo_pairs[{index}]"
         yield from _transform(f"{where}.X_FL", pair.X_FL)

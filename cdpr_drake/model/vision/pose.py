@@ -11,6 +11,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, skew
+from cdpr_drake.model.vision.cameras import Intrinsics
 from cdpr_drake.model.vision.rotation_means import mean_pose
 from cdpr_drake.model.vision.targets import Sightings, TargetGeometry
 
@@ -184,27 +185,9 @@ class PoseEstimator:
 
     def _candidates(self, view: _View) -> list[RigidTransform]:
         """Return the one or two poses X_WP that explain a plane pattern in an image."""
-        import cv2
-
-        camera = self._intrinsics[view.camera]
-        try:
-            _, turns, shifts, _ = cv2.solvePnPGeneric(
-                self._flat[view.points],
-                view.seen,
-                camera.camera_matrix,
-                camera.distortion,
-                flags=cv2.SOLVEPNP_IPPE,
-            )
-        except cv2.error:  # three points on a line with one beside it
-            return []
-        poses = []
-        for turn, shift in zip(turns, shifts, strict=True):
-            if np.all(np.isfinite(turn)) and np.all(np.isfinite(shift)):
-                R_CT: Any = cv2.Rodrigues(turn)[0]
-                rotation = RotationMatrix.ProjectToRotationMatrix(R_CT)
-                X_CT = RigidTransform(rotation, shift.ravel())
-                poses.append(self._X_WC[view.camera] @ X_CT @ self._X_TP[view.pattern])
-        return poses
+        camera = view.camera
+        poses = plane_poses(self._flat[view.points], view.seen, self._intrinsics[camera])
+        return [self._X_WC[camera] @ X_CT @ self._X_TP[view.pattern] for X_CT in poses]
 
     def _pixel_error(self, stacked: tuple[Any, Array, Array], X_WP: RigidTransform) -> float:
         which, points, seen = stacked
@@ -218,6 +201,32 @@ class PoseEstimator:
         which = np.repeat([v.camera for v in views], [v.points.size for v in views])
         points = self._geometry.points[np.concatenate([v.points for v in views])]
         return which, points, np.concatenate([v.seen for v in views])
+
+
+def plane_poses(points: Array, seen: Array, camera: Intrinsics) -> list[RigidTransform]:
+    """Return the one or two poses X_CT that explain points of a plane in an image; none if bad.
+
+    Args:
+        points: (n, 3) [m], at least four, in T, their z coordinates 0.
+        seen: (n, 2) [px], where they are seen.
+        camera: how the camera projects.
+    """
+    import cv2
+
+    matrix, distortion = camera.camera_matrix, camera.distortion
+    try:
+        _, turns, shifts, _ = cv2.solvePnPGeneric(
+            points, seen, matrix, distortion, flags=cv2.SOLVEPNP_IPPE
+        )
+    except cv2.error:  # three points on a line with one beside it
+        return []
+    poses = []
+    for turn, shift in zip(turns, shifts, strict=True):
+        if np.all(np.isfinite(turn)) and np.all(np.isfinite(shift)):
+            R_CT: Any = cv2.Rodrigues(turn)[0]
+            rotation = RotationMatrix.ProjectToRotationMatrix(R_CT)
+            poses.append(RigidTransform(rotation, shift.ravel()))
+    return poses
 
 
 def _rows(X: RigidTransform) -> Array:

@@ -1,0 +1,86 @@
+"""What a lens does to an image: a pinhole's image, as a renderer draws it, to a camera's own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cdpr_drake.errors import RobotFileError
+from cdpr_drake.model.rotations import Array
+from cdpr_drake.model.vision.cameras import Intrinsics
+
+LARGEST = 3.0
+"""A pinhole's image this many times as wide as the camera's would be beyond all use."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pinhole:
+    """A camera without distortion, its pixels square, its axis in the middle of the image.
+
+    Attributes:
+        focal_length: [px].
+        width: [px].
+        height: [px].
+    """
+
+    focal_length: float
+    width: int
+    height: int
+
+    @property
+    def centre(self) -> tuple[float, float]:
+        """Where the axis meets the image [px], the centre of the first pixel being (0, 0)."""
+        return 0.5 * (self.width - 1), 0.5 * (self.height - 1)
+
+
+class Lens:
+    """Turns the image of a pinhole into that of a camera with distortion, by interpolation.
+
+    The pinhole has the camera's larger focal length, so that nothing is magnified, and sees all
+    that the camera does.
+
+    Args:
+        intrinsics: of the camera.
+
+    Raises:
+        RobotFileError: the distortion leads too far outside of what a pinhole can see.
+    """
+
+    def __init__(self, intrinsics: Intrinsics) -> None:
+        rays = _rays(intrinsics)
+        f = float(max(intrinsics.camera_matrix[0, 0], intrinsics.camera_matrix[1, 1]))
+        reach = f * np.abs(rays).max(axis=(0, 1))
+        size = np.array([intrinsics.width, intrinsics.height])
+        if not np.all(reach <= 0.5 * LARGEST * size):
+            raise RobotFileError("camera", "distortion", "a pinhole cannot see what this lens does")
+        width, height = (2 * int(np.ceil(r + 1.0)) for r in reach)
+        self.pinhole = Pinhole(focal_length=f, width=width, height=height)
+        self._map = (f * rays + self.pinhole.centre).astype(np.float32)
+
+    def __call__(self, image: Any, out: Any) -> None:
+        """Write the camera's image.
+
+        Args:
+            image: (height, width, channels), uint8, of the pinhole.
+            out: (height, width, channels), uint8, of the camera.
+        """
+        import cv2
+
+        cv2.remap(image, self._map, None, cv2.INTER_LINEAR, dst=out)  # type: ignore[call-overload]
+
+
+def _rays(intrinsics: Intrinsics) -> Array:
+    """Return (height, width, 2): where each pixel's ray meets the plane z = 1."""
+    import cv2
+
+    u, v = np.meshgrid(np.arange(float(intrinsics.width)), np.arange(float(intrinsics.height)))
+    criteria = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 50, 1e-9)
+    rays: Any = cv2.undistortPoints(
+        np.stack([u.ravel(), v.ravel()], axis=1)[:, None],
+        intrinsics.camera_matrix,
+        intrinsics.distortion,
+        criteria=criteria,
+    )
+    return rays.reshape(intrinsics.height, intrinsics.width, 2)
