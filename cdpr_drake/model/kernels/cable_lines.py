@@ -10,7 +10,7 @@ at (n,): that row or column; places (n,): where on the scan the band's middle is
 first and last dark pixel, as indices in the profile; level (2,): grey of panel and cable; place,
 width: one of places, from the start, and of widths; edges (n, 2): where the band begins and ends;
 x, y, weight (n,): points and weights of a line; line (2,): y = line[0] + line[1] x; scale: size of
-one pixel in units of y.
+one pixel in units of y; values, spare (n,): numbers of which `count` count, and room for n.
 """
 
 from __future__ import annotations
@@ -62,6 +62,27 @@ def take(image, steep, at, start, profile):
 
 
 @jit
+def median(values, count):
+    """Return the middle one of the first values, which are reordered (Hoare's selection)."""
+    low, high, wanted = 0, count - 1, count // 2
+    while low < high:
+        pivot, i, j = values[wanted], low, high
+        while i <= j:
+            while values[i] < pivot:
+                i += 1
+            while values[j] > pivot:
+                j -= 1
+            if i <= j:
+                values[i], values[j] = values[j], values[i]
+                i, j = i + 1, j - 1
+        if j < wanted:
+            low = i
+        if i > wanted:
+            high = j
+    return values[wanted]
+
+
+@jit
 def find_band(profile, place, width, contrast, run, level):
     """Write the dark run nearest to a place, and the levels of panel and cable.
 
@@ -71,7 +92,9 @@ def find_band(profile, place, width, contrast, run, level):
     between could be either's.
     """
     m = profile.shape[0]
-    low, high = profile.min(), profile.max()
+    low, high = np.inf, -np.inf
+    for j in range(m):
+        low, high = min(low, profile[j]), max(high, profile[j])
     half = 0.5 * (low + high)
     if high - low < contrast:
         return False
@@ -101,7 +124,7 @@ def find_band(profile, place, width, contrast, run, level):
             return False
     if count < 2:
         return False
-    level[0] = np.median(panel[:count])
+    level[0] = median(panel, count)
     total = 0.0
     for j in range(start, end + 1):
         total += level[0] - profile[j]
@@ -141,12 +164,16 @@ def scan(image, steep, at, places, widths, reach, contrast, edges, weight):
     One dark level serves all scans of a cable: the median, which averages the noise.
     """
     n = at.shape[0]
-    m = 2 * int(reach + 0.5 * widths.max() + MARGIN + 3.0) + 1
+    widest = 0.0
+    for i in range(n):
+        widest = max(widest, widths[i])
+    m = 2 * int(reach + 0.5 * widest + MARGIN + 3.0) + 1
     profiles, starts = np.empty((n, m)), np.empty(n, np.int64)
     runs, levels = np.empty((n, 2), np.int64), np.empty((n, 2))
-    found, dark = np.zeros(n, np.bool_), np.empty(n)
+    found, dark = np.empty(n, np.bool_), np.empty(n)
     count = 0
     for i in range(n):
+        found[i] = False
         if not np.isfinite(places[i]):
             continue
         starts[i] = int(np.floor(places[i] + 0.5)) - m // 2
@@ -155,7 +182,7 @@ def scan(image, steep, at, places, widths, reach, contrast, edges, weight):
             found[i] = find_band(profiles[i], place, widths[i], contrast, runs[i], levels[i])
         if found[i]:
             dark[count], count = levels[i, 1], count + 1
-    cable = np.median(dark[:count]) if count else 0.0
+    cable = median(dark, count) if count else 0.0
     for i in range(n):
         edges[i, 0], edges[i, 1], weight[i] = np.nan, np.nan, 0.0
         if found[i] and levels[i, 0] - cable >= 0.5 * contrast:
@@ -166,42 +193,50 @@ def scan(image, steep, at, places, widths, reach, contrast, edges, weight):
 
 
 @jit
-def steady_line(x, y):
+def steady_line(x, y, spare):
     """Return the line (intercept, slope) of Theil and Sen: three in ten points may be wrong."""
     n = x.shape[0]
-    slopes, count = np.empty(n * (n - 1) // 2), 0
+    slopes, count = np.empty(n * (n - 1) // 2 + 1), 0
     for i in range(n):
         for j in range(i):
             if x[i] != x[j]:
                 slopes[count], count = (y[i] - y[j]) / (x[i] - x[j]), count + 1
-    slope = np.median(slopes[:count]) if count else 0.0
-    return np.median(y - slope * x), slope
+    slope = median(slopes, count) if count else 0.0
+    for i in range(n):
+        spare[i] = y[i] - slope * x[i]
+    return median(spare, n), slope
 
 
 @jit
 def weighted_line(x, y, weight, scale, line):
     """Write the line of least weighted squares, rejecting outliers by Tukey's biweight.
 
-    Starts from Theil's and Sen's. The weights become those of the last step: 0 for outliers.
-    Returns the number of points that agree.
+    Starts from Theil's and Sen's. The weights are multiplied by those of the last step: 0 for
+    outliers. Returns the number of points that agree.
     """
-    given = weight.copy()
-    line[0], line[1] = steady_line(x, y)
+    n = x.shape[0]
+    error, share = np.empty(n), np.empty(n)
+    line[0], line[1] = steady_line(x, y, error)
+    count = 0
     for _ in range(STEPS):
-        error = np.abs(y - line[0] - line[1] * x)
-        limit = TUKEY * max(1.4826 * np.median(error), FINEST * scale)
+        for i in range(n):
+            error[i] = abs(y[i] - line[0] - line[1] * x[i])
+        limit = TUKEY * max(1.4826 * median(error, n), FINEST * scale)
         s, sx, sy, sxx, sxy = 0.0, 0.0, 0.0, 0.0, 0.0
         count = 0
-        for i in range(x.shape[0]):
-            q = error[i] / limit
-            weight[i] = given[i] * (1.0 - q * q) ** 2 if q < 1.0 else 0.0
-            count += weight[i] > 0.0
-            s, sx, sy = s + weight[i], sx + weight[i] * x[i], sy + weight[i] * y[i]
-            sxx, sxy = sxx + weight[i] * x[i] * x[i], sxy + weight[i] * x[i] * y[i]
+        for i in range(n):
+            q = (y[i] - line[0] - line[1] * x[i]) / limit
+            share[i] = (1.0 - q * q) ** 2 if abs(q) < 1.0 else 0.0
+            w = weight[i] * share[i]
+            count += 1 if w > 0.0 else 0
+            s, sx, sy = s + w, sx + w * x[i], sy + w * y[i]
+            sxx, sxy = sxx + w * x[i] * x[i], sxy + w * x[i] * y[i]
         det = s * sxx - sx * sx
         if count < 3 or not det > 1e-12 * s * sxx:
             return 0
         line[0], line[1] = (sxx * sy - sx * sxy) / det, (s * sxy - sx * sy) / det
+    for i in range(n):
+        weight[i] *= share[i]
     return count
 
 
@@ -214,33 +249,35 @@ def fit_edge(expected, seen, weight, scale):
     did not agree becomes NaN. Returns whether enough did.
     """
     n = expected.shape[0]
-    usable = np.zeros(n, np.bool_)
+    which, count = np.empty(n, np.int64), 0
     for i in range(n):
-        usable[i] = np.isfinite(expected[i, 0]) and np.isfinite(seen[i, 0])
-    which = np.flatnonzero(usable)
-    count = which.shape[0]
+        if np.isfinite(expected[i, 0]) and np.isfinite(seen[i, 0]):
+            which[count], count = i, count + 1
     if count < max(3, FEWEST * n):
         return False
     first, last = which[0], which[count - 1]
-    dx, dy = expected[last, 0] - expected[first, 0], expected[last, 1] - expected[first, 1]
+    ox, oy = expected[first, 0], expected[first, 1]
+    dx, dy = expected[last, 0] - ox, expected[last, 1] - oy
     size = np.sqrt(dx * dx + dy * dy)
     if not size > 0.0:
         return False
     dx, dy = dx / size, dy / size
-    bend, spot = np.empty(count), np.empty(count)
-    x, y, w = np.empty(count), np.empty(count), np.empty(count)
+    spot, bend, w = np.empty(count), np.empty(count), np.empty(count)
+    x, y, line = np.empty(count), np.empty(count), np.empty(2)
     for k in range(count):
-        i = which[k]
-        a, b = expected[i, 0] - expected[first, 0], expected[i, 1] - expected[first, 1]
+        a, b = expected[which[k], 0] - ox, expected[which[k], 1] - oy
         spot[k], bend[k] = a * dx + b * dy, b * dx - a * dy
-        a, b = seen[i, 0] - expected[first, 0], seen[i, 1] - expected[first, 1]
-        x[k], y[k], w[k] = a * dx + b * dy, b * dx - a * dy, weight[i]
-    y -= np.interp(x, spot, bend)
-    line = np.empty(2)
+    for k in range(count):
+        a, b = seen[which[k], 0] - ox, seen[which[k], 1] - oy
+        x[k], w[k] = a * dx + b * dy, weight[which[k]]
+        # The bend of the edge expected, beside the point seen.
+        j = min(max(k, 1), count - 1)
+        part = (x[k] - spot[j - 1]) / (spot[j] - spot[j - 1])
+        y[k] = b * dx - a * dy - (bend[j - 1] + part * (bend[j] - bend[j - 1]))
     if weighted_line(x, y, w, scale, line) < FEWEST * n:
         return False
     for i in range(n):
-        if not usable[i]:
+        if not np.isfinite(seen[i, 0]):
             expected[i, 0] = expected[i, 1] = np.nan
     for k in range(count):
         i = which[k]
@@ -257,20 +294,27 @@ def place_scans(pixels, at, places, widths):
     the second on them.
     """
     n = pixels.shape[1]
-    middle = 0.5 * (pixels[0] + pixels[1])
-    seen = np.flatnonzero(np.isfinite(middle[:, 0]))
-    span = middle[seen[seen.shape[0] - 1]] - middle[seen[0]]
-    steep = abs(span[1]) > abs(span[0])
+    first, last = -1, -1
+    for i in range(n):
+        if np.isfinite(pixels[0, i, 0] + pixels[1, i, 0]):
+            first, last = i if first < 0 else first, i
+    run = pixels[0, last, 0] - pixels[0, first, 0]
+    fall = pixels[0, last, 1] - pixels[0, first, 1]
+    steep = abs(fall) > abs(run)
     long, wide = (1, 0) if steep else (0, 1)
-    slope = span[wide] / span[long]
-    signed = 0.0
+    long_enough = max(abs(run), abs(fall)) > 1.0  # else the cable points to the camera
+    slope, signed = 0.0, 0.0
+    if long_enough:
+        slope = run / fall if steep else fall / run
     for i in range(n):
         at[i], places[i], widths[i] = 0, np.nan, 0.0
-        if np.isfinite(middle[i, 0]):
-            at[i] = int(np.floor(middle[i, long] + 0.5))
-            places[i] = middle[i, wide] + slope * (at[i] - middle[i, long])
-            across = pixels[1, i] - pixels[0, i]
-            signed = across[wide] - slope * across[long]
+        if long_enough and np.isfinite(pixels[0, i, 0] + pixels[1, i, 0]):
+            along = 0.5 * (pixels[0, i, long] + pixels[1, i, long])
+            at[i] = int(np.floor(along + 0.5))
+            middle = 0.5 * (pixels[0, i, wide] + pixels[1, i, wide])
+            places[i] = middle + slope * (at[i] - along)
+            ahead = pixels[1, i, long] - pixels[0, i, long]
+            signed = pixels[1, i, wide] - pixels[0, i, wide] - slope * ahead
             widths[i] = abs(signed)
     return steep, signed < 0.0
 
@@ -284,7 +328,10 @@ def detect(image, camera, plane, reach, contrast, pixels):
     height, width = image.shape
     n = plane.shape[1]
     to_pixels(camera, width, height, plane, pixels)
-    found = np.sum(np.isfinite(pixels[0, :, 0] + pixels[1, :, 0])) >= max(3.0, FEWEST * n)
+    count = 0
+    for i in range(n):
+        count += 1 if np.isfinite(pixels[0, i, 0] + pixels[1, i, 0]) else 0
+    found = count >= max(3, FEWEST * n)
     if found:
         at, places, widths = np.empty(n, np.int64), np.empty(n), np.empty(n)
         edges, weight, points = np.empty((n, 2)), np.empty(n), np.empty((n, 2))
