@@ -70,6 +70,10 @@ def dispatch(options: Namespace) -> int:
             from cdpr_drake.commands.calibrate import calibrate_command
 
             return calibrate_command(options)
+        if options.command == "reproduce":
+            from cdpr_drake.commands.reproduce import reproduce_command
+
+            return reproduce_command(options)
         from cdpr_drake.commands.run import run_command
 
         return run_command(options)

@@ -96,6 +96,9 @@ def _build_parser() -> argparse.ArgumentParser:
     from cdpr_drake.commands.calibrate_arguments import add_calibrate
 
     add_calibrate(commands)
+    from cdpr_drake.commands.reproduce_arguments import add_reproduce
+
+    add_reproduce(commands)
     commands.add_parser(
         "robots",
         help="list the built-in robots",

@@ -121,6 +121,52 @@ class Progress:
         print(line, end="", file=sys.stderr, flush=True)
 
 
+class CaseProgress:
+    """The progress of a sweep on stderr: a bar on a terminal, one line at the end elsewhere."""
+
+    def __init__(self) -> None:
+        self._is_terminal = sys.stderr.isatty()
+        self._begun = time.monotonic()
+        self._resumed: int | None = None
+        self._counts = (0, 0)
+
+    def __call__(self, done: int, total: int) -> None:
+        """Show how many cases are done.
+
+        Args:
+            done: so many.
+            total: of so many.
+        """
+        self._counts = (done, total)
+        if self._resumed is None:
+            self._resumed = done
+        if not self._is_terminal:
+            return
+        counter = f"{done:{len(str(total))}} of {total} cases  {self._took()}"
+        room = width_of(sys.stderr) - len(counter) - 6
+        bar = ""
+        if room >= 5 and total:
+            filled = room * done // total
+            bar = f"[{'#' * filled}{'.' * (room - filled)}]  "
+        self._draw(f"{bar}{counter}")
+
+    def done(self) -> None:
+        """Replace the bar by a last line."""
+        done, total = self._counts
+        earlier = f", {self._resumed} of them earlier" if self._resumed else ""
+        self._draw(f"{done} of {total} cases{earlier}, in {self._took()}")
+        print(file=sys.stderr, flush=True)
+
+    def _took(self) -> str:
+        return f"{time.monotonic() - self._begun:.0f} s"
+
+    def _draw(self, line: str) -> None:
+        if self._is_terminal:
+            width = width_of(sys.stderr) - 1
+            line = f"\r{line[:width]:<{width}}"
+        print(line, end="", file=sys.stderr, flush=True)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Column:
     """A column of a table.

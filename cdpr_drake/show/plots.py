@@ -130,7 +130,7 @@ def tension_figure(runs: Runs, robot: CableRobot) -> Figure:
             _limit(axes, high, f"upper limit {high:g} N")
         else:
             _limit(axes, low, f"lower limit {low:g} N\n(upper limit {high:g} N, out of view)")
-        _number_cables(axes)
+        number_cables(axes)
     return figure
 
 
@@ -151,7 +151,7 @@ def sag_figure(runs: Runs, robot: CableRobot) -> Figure:
     panels[1][0].set_ylabel("sag below the chord [mm]")
     for axes in panels.flat:
         axes.set_ylim(bottom=0.0)
-        _number_cables(axes)
+        number_cables(axes)
     return figure
 
 
@@ -277,8 +277,12 @@ def _plot_cables(panels: Any, runs: Runs, values: Callable[[Record], np.ndarray]
             axes.plot(run.time, signal, linewidth=1.1, color=cable_colour(i), label=label)
 
 
-def _number_cables(axes: Axes) -> None:
-    """Write the cables' numbers beside the ends of their lines; the limits must be final."""
+def number_cables(axes: Axes) -> None:
+    """Write the cables' numbers beside the ends of their lines; the limits must be final.
+
+    Args:
+        axes: whose lines have labels such as "cable 1".
+    """
     from matplotlib.lines import Line2D
 
     low, high = axes.get_ylim()
