@@ -39,11 +39,13 @@ class Contestant:
         name: for the tables.
         call: does the work once.
         units: how many pieces of work that is.
+        before: what has to be made anew for each call, off the clock; `call` then takes it.
     """
 
     name: str
-    call: Callable[[], object]
-    units: int = 1
+    call: Callable[..., object]
+    units: float = 1
+    before: Callable[[], object] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,19 +66,22 @@ class Spread:
         return Spread(median=self.median * factor, low=self.low * factor, high=self.high * factor)
 
 
-def interleave(contestants: Sequence[Contestant], rounds: int) -> dict[str, list[float]]:
+def interleave(
+    contestants: Sequence[Contestant], rounds: int, warm: int = 1
+) -> dict[str, list[float]]:
     """Return the CPU time [s] of a unit of each contestant's work, one for each round.
 
-    Each is called once before, which compiles what has to be compiled and fills the caches.
+    There are `warm` rounds before, which compile what has to be compiled and fill the caches.
     """
     times: dict[str, list[float]] = {c.name: [] for c in contestants}
-    for c in contestants:
-        c.call()
-    for _ in range(rounds):
+    for turn in range(-warm, rounds):
         for c in contestants:
+            given = () if c.before is None else (c.before(),)
             begun = time.process_time()
-            c.call()
-            times[c.name].append((time.process_time() - begun) / c.units)
+            c.call(*given)
+            took = time.process_time() - begun
+            if turn >= 0:
+                times[c.name].append(took / c.units)
     return times
 
 
