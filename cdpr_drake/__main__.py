@@ -66,6 +66,10 @@ def dispatch(options: Namespace) -> int:
             from cdpr_drake.commands.coupling import coupling_command
 
             return coupling_command(options)
+        if options.command == "ablate":
+            from cdpr_drake.commands.ablate import ablate_command
+
+            return ablate_command(options)
         if options.command == "calibrate":
             from cdpr_drake.commands.calibrate import calibrate_command
 

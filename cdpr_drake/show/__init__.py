@@ -14,11 +14,13 @@ from cdpr_drake.show.plots import (
 )
 from cdpr_drake.show.replay import write_replay
 from cdpr_drake.show.screenshot import BrowserError, screenshot_replay
+from cdpr_drake.show.sensor_plots import ablation_figure
 from cdpr_drake.show.study_plots import gain_map_figure, rates_and_responses_figure
 
 __all__ = [
     "BrowserError",
     "GraphvizError",
+    "ablation_figure",
     "block_diagram",
     "block_diagram_dot",
     "cable_sag",
