@@ -1,0 +1,270 @@
+"""Table 4: where vision-based and joint space control end, Tests 1 to 3."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from cdpr_drake.experiments.reproduction import table4_tables as tables
+from cdpr_drake.experiments.reproduction.assumptions import assumed, printed
+from cdpr_drake.experiments.reproduction.explanations import EXPLANATIONS, TESTS
+from cdpr_drake.experiments.reproduction.section import Case, Claim, Result, Section
+from cdpr_drake.experiments.reproduction.table4_work import (
+    FEW,
+    calibration,
+    camera_run,
+    explain,
+    fitted_ends,
+    joint_space_run,
+    noise_run,
+    vision_run,
+)
+from cdpr_drake.model.rotations import Array
+
+name = "table4"
+
+CHUNK = {"joint": 5, "few": 4, "mean": 10, "independent": 20}
+"""Seeds of one case, by the kind of calibration."""
+
+NOISY_TEST = 3
+VERIFIED_TESTS = (1, 3)
+"""Tests whose ends are verified by runs with cameras that see the patterns."""
+
+TOLERANCE = {"position": 10.0, "orientation": 0.5}
+"""What the paper claims of vision-based control in its section 1 [mm, deg]."""
+
+CLOSE_Z, CLOSE_LARGEST = 0.15, 0.25
+"""How near the two printed JSC errors ours must be, as a share of them."""
+
+
+def cases() -> Sequence[Case]:
+    """Return the fits, the calibrations, and the runs."""
+    work = [Case(key=f"vbc-{n}", function=vision_run, arguments={"number": n}) for n in TESTS]
+    work += [
+        Case(key=f"explain-{i + 1}", function=explain, arguments={"index": i})
+        for i in range(len(EXPLANATIONS))
+    ]
+    for kind, chunks in _chunks().items():
+        work += [
+            Case(
+                key=f"calibrations-{kind}-{i + 1}",
+                function=calibration,
+                arguments={"kind": kind, "seeds": seeds},
+            )
+            for i, seeds in enumerate(chunks)
+        ]
+    work += [Case(key=f"jsc-{n}", function=joint_space_run, arguments={"number": n}) for n in TESTS]
+    work += [
+        Case(key=f"cameras-{n}", function=camera_run, arguments={"number": n})
+        for n in VERIFIED_TESTS
+    ]
+    work.append(Case(key="noise", function=noise_run, arguments={"number": NOISY_TEST}))
+    work.append(Case(key="jsc-statics", function=fitted_ends))
+    return work
+
+
+def _chunks() -> dict[str, list[list[int]]]:
+    """Return the seeds of each case, by the kind; those that only compare have fewer."""
+    seeds = list(range(assumed(name)["seeds"]))
+    chunks = {}
+    for kind, size in CHUNK.items():
+        used = seeds[: len(seeds) // 2] if kind == "few" else seeds
+        chunks[kind] = [used[i : i + size] for i in range(0, len(used), size)]
+    return chunks
+
+
+def section(results: Mapping[str, Result]) -> Section:
+    """Return the section on Table 4.
+
+    Args:
+        results: of all cases, by their keys.
+    """
+    visions = {kind: gather(results, kind) for kind in CHUNK}
+    return Section(
+        name=name,
+        title="Table 4: vision-based against joint space control, Tests 1 to 3",
+        text=_text(results, visions),
+        tables=(
+            tables.errors(results, visions["joint"]),
+            tables.explanations(results),
+            tables.apart(results),
+            tables.calibrations(visions),
+            tables.verification(results),
+            tables.sensitivity(results["jsc-statics"]),
+        ),
+        claims=(*_vision_claims(results, visions["joint"]), *_joint_space_claims(results)),
+        fitted=assumed(name),
+    )
+
+
+def gather(results: Mapping[str, Result], kind: str) -> dict[str, Array]:
+    """Return the ends of all seeds of a kind of calibration (seeds, tests, 3) [mm], [deg].
+
+    Args:
+        results: of all cases, by their keys.
+        kind: of calibration.
+    """
+    parts = [results[key] for key in results if key.startswith(f"calibrations-{kind}-")]
+    return {
+        what: np.concatenate([np.asarray(part[what]) for part in parts])
+        for what in ("position", "orientation")
+    }
+
+
+def with_noise(results: Mapping[str, Result], ends: Mapping[str, Array]) -> tuple[float, float]:
+    """Return the largest errors of all seeds and tests, norms [mm], [deg], and 3 sigma of noise.
+
+    Args:
+        results: of all cases, by their keys.
+        ends: of `gather`.
+    """
+    noise = results["noise"]
+    largest = [
+        float(np.linalg.norm(ends[what], axis=2).max() + 3.0 * np.linalg.norm(noise[what]))
+        for what in ("position", "orientation")
+    ]
+    return largest[0], largest[1]
+
+
+def _vision_claims(results: Mapping[str, Result], ends: dict[str, Array]) -> list[Claim]:
+    paper = printed(name)
+    position, orientation = with_noise(results, ends)
+    most = [float(np.abs(ends[what]).max()) for what in ("position", "orientation")]
+    test_1 = results["vbc-1"]
+    unfinished = float(np.abs(test_1["then"][:3]).max())
+    left = 1e3 * tables.left_over(1)
+    jsc = np.abs(results["jsc-statics"]["position"][:, 2])
+    seeds = len(ends["position"])
+    return [
+        Claim(
+            text="VBC is accurate to 10 mm and 0.5°",
+            printed="10 mm, 0.5°",
+            ours=f"at most {position:.1f} mm, {orientation:.2f}°",
+            agrees=position <= TOLERANCE["position"] and orientation <= TOLERANCE["orientation"],
+            reason=f"true errors at rest, norms, of {seeds} calibrations in each test, with "
+            "3 σ of the noise",
+        ),
+        Claim(
+            text="largest VBC errors in Table 4, a component",
+            printed=f"{paper['vbc_position'].value} mm, {paper['vbc_orientation'].value}°",
+            ours=f"{most[0]:.1f} mm, {most[1]:.2f}° at rest; {unfinished:.1f} mm after "
+            f"{test_1['after']:.0f} s",
+            agrees=most[0] <= paper["vbc_position"].value
+            and most[1] <= paper["vbc_orientation"].value,
+            reason=f"ours is less at rest; after {test_1['after']:.0f} s the exponential alone has "
+            f"left {left:.1f} mm of Test 1's move (norm), which may be all of the printed number",
+        ),
+        Claim(
+            text="VBC is more accurate than JSC along z in every test",
+            printed="a significant improvement",
+            ours=f"{np.abs(ends['position'][:, :, 2]).max():.1f} mm against {jsc.min():.1f} mm",
+            agrees=bool(np.abs(ends["position"][:, :, 2]).max() < jsc.min()),
+        ),
+    ]
+
+
+def _joint_space_claims(results: Mapping[str, Result]) -> list[Claim]:
+    paper, statics = printed(name), results["jsc-statics"]
+    position = np.asarray(statics["position"])
+    theirs_z, theirs = paper["jsc_z_test_3"].value, paper["jsc_position"].value
+    z, largest = float(position[2, 2]), float(np.abs(position[:2]).max())
+    sideways = float(np.abs(position[:, :2]).max())
+    empty, loaded = statics["beyond"][:2]
+    one_set = "one set of cables for all tests, fitted to these two numbers"
+    return [
+        Claim(
+            text="JSC error along z in Test 3",
+            printed=f"{theirs_z} mm",
+            ours=f"{z:.1f} mm",
+            agrees=abs(z - theirs_z) <= CLOSE_Z * abs(theirs_z),
+            reason=one_set,
+        ),
+        Claim(
+            text="largest JSC error of Tests 1 and 2",
+            printed=f"{theirs} mm",
+            ours=f"{largest:.1f} mm",
+            agrees=abs(largest - theirs) <= CLOSE_LARGEST * theirs,
+            reason=one_set,
+        ),
+        Claim(
+            text="the JSC error is mainly downwards",
+            printed="relatively poor along the vertical axis",
+            ours=f"z {position[:, 2].max():.1f} to {position[:, 2].min():.1f} mm, x and y at most "
+            f"{sideways:.1f} mm",
+            agrees=bool(position[:, 2].max() < -3.0 * sideways),
+        ),
+        Claim(
+            text="with less mass JSC errs less along z, Test 3 than Tests 1 and 2",
+            printed="lower, a direct consequence of the smaller mass",
+            ours=f"{abs(z):.1f} mm against {', '.join(f'{-p:.1f}' for p in position[:2, 2])} mm",
+            agrees=bool(abs(z) < np.abs(position[:2, 2]).min()),
+        ),
+        Claim(
+            text="VBC is not sensitive to the mass carried, JSC is",
+            printed="not sensitive; Test 3 on overall smaller",
+            ours=f"JSC at Test 2's goal {empty:.1f} mm empty, {loaded:.1f} mm loaded; VBC the same",
+            agrees=bool(abs(loaded) > 1.1 * abs(empty)) and _mass_does_not_matter(results),
+            reason="at rest VBC sees no error, whatever hangs on the cables: runs of both masses "
+            f"end within {_farthest(results):.2f} mm of where the cameras say",
+        ),
+    ]
+
+
+def _mass_does_not_matter(results: Mapping[str, Result]) -> bool:
+    """Whether runs of both masses end where the calibration alone says, to a tenth of 10 mm."""
+    return _farthest(results) < 0.1 * TOLERANCE["position"]
+
+
+def _farthest(results: Mapping[str, Result]) -> float:
+    """Return how far the ends of vision-based runs are from those of statics at most [mm]."""
+    keys = [f"vbc-{n}" for n in TESTS] + [f"cameras-{n}" for n in VERIFIED_TESTS]
+    return max(
+        float(np.linalg.norm(results[key]["rest"][:3] - results[key]["predicted"][:3]))
+        for key in keys
+    )
+
+
+def _text(results: Mapping[str, Result], visions: dict[str, dict[str, Any]]) -> tuple[str, ...]:
+    noise, values = results["noise"], assumed(name)
+    exact = [
+        results[f"explain-{i + 1}"]["name"]
+        for i in range(len(EXPLANATIONS))
+        if np.abs(results[f"explain-{i + 1}"]["left"]).max() < 0.1
+    ]
+    means = float(np.abs(visions["mean"]["position"]).max())
+    alone = float(np.linalg.norm(visions["independent"]["position"], axis=2).max())
+    return (
+        "The paper's table lost its rows in our copy; its text gives the four numbers that ours "
+        "are compared with. All errors are true ones, those of E in F_b, as a laser tracker "
+        "measures them.",
+        "Joint space control: the winches' integral action leaves no error of the motors, so that "
+        "the end is the rest of the elastic catenaries on the lengths that the inverse kinematics "
+        "asked for; runs verify it. Six explanations of the error are fitted to the two printed "
+        f"numbers, each within the literature's range. Exact: {', '.join(exact) or 'none'}. What "
+        "is proportional to the load (a constant modulus, compliant posts) gives Test 2 about "
+        "twice the error of Test 3 whatever its value, where the paper has 1.33 times at most: "
+        "something that does not grow with the load, or grows less, is needed. An encoder offset "
+        "and a stiffening modulus do that and cannot be told apart by Table 4: they predict all "
+        "its entries within a few millimetres of each other. Other payloads would tell. Friction "
+        "and posts add too little within their ranges, and posts cannot be told from a softer "
+        "cable at all. All runs take the stiffening modulus, for a wire rope is known to stiffen, "
+        "and an offset is not known to be there; it ends at the bounds of its range.",
+        "Vision-based control: at rest the controller sees no error, so that the platform is "
+        "where its cameras show it at the goal. What is wrong with that is what calibration and "
+        "the images' fixed errors leave. Misjudging ^fT_b and ^mT_e each by itself (3 mm and 0.1°, "
+        f"1 σ) would give up to {alone:.0f} mm; but section 4.3 finds both together, by a laser "
+        f"tracker and {values['calibration_poses']} poses of the platform, so that their errors "
+        "compensate each other where the robot works. We take that calibration, simulated, as the "
+        f"realistic one: {values['seeds']} of them, with new fixed errors of the images each. "
+        f"{FEW} poses would leave more. With the paper's estimator, the mean of the patterns' "
+        f"poses, the same images give up to {means:.1f} mm in a component.",
+        f"The noise adds {noise['position'].max():.3f} mm (1 σ, a run of {NOISY_TEST}'s goal; "
+        f"{noise['position_of_law']:.3f} mm by the law's own filter), so that ends of the "
+        f"{values['seeds']} seeds need no run each: each test is run once to its rest, with noise "
+        "and a calibration, and two more near their rest with cameras that see the patterns.",
+        "Fig. 10 ends at 200 s, after six time constants of its gain. The exponential has then "
+        f"left {1e3 * tables.left_over(1):.1f} mm of Test 1's {tables.amplitude(1):.2f} m: about "
+        "the printed maximum, before any calibration error.",
+    )
