@@ -22,7 +22,7 @@ from cdpr_drake.diagrams import (
     simulate,
     with_reference,
 )
-from cdpr_drake.diagrams.control import SENSORS
+from cdpr_drake.diagrams.eyes import SENSORS
 from cdpr_drake.diagrams.simulation import MAX_STEP
 from cdpr_drake.errors import CdprError
 from cdpr_drake.experiments.metrics import Summary, summarize
@@ -34,7 +34,9 @@ from cdpr_drake.model.rotations import Array, as_pose, pose_to_vector
 from cdpr_drake.model.servo import PoseErrorMap
 from cdpr_drake.model.vision.outages import Outage
 from cdpr_drake.model.vision.pose import ESTIMATORS
+from cdpr_drake.study.modes import platform_modes
 from cdpr_drake.study.stability import SampledServo, StabilityWarning, find_gain_limit
+from cdpr_drake.study.step_size import StepWarning, step_error, step_limit
 from cdpr_drake.systems import ExponentialApproach
 
 CONTROLLERS = ("VBC", "JSC")
@@ -208,7 +210,7 @@ def prepare(setup: Setup) -> Prepared:
     """Return a run ready to start. All that can be refused beforehand is refused here.
 
     A StabilityWarning tells that the gain is above the limit predicted at the goal, or why there is
-    no prediction.
+    no prediction; a StepWarning that the integrator's step is too coarse for the robot's modes.
 
     Args:
         setup: the setup.
@@ -228,6 +230,8 @@ def prepare(setup: Setup) -> Prepared:
     _evaluate_all(loop, context)
     if message := doubt_about_gain(setup):
         warnings.warn(message, StabilityWarning, stacklevel=2)
+    if message := doubt_about_step(setup):
+        warnings.warn(message, StepWarning, stacklevel=2)
     return Prepared(setup=setup, loop=loop, context=context)
 
 
@@ -290,6 +294,27 @@ def doubt_about_gain(setup: Setup) -> str:
     return (
         f"{setup.label}: the gain of {setup.gain:g}/s is above the limit predicted at the goal, "
         f"{limit.gain:.3g}/s, where {limit.mode} goes unstable at {limit.frequency:.3g} Hz"
+    )
+
+
+def doubt_about_step(setup: Setup) -> str:
+    """Return why the integrator's step is too coarse for a setup, in a line; "" if it is not.
+
+    Args:
+        setup: the setup.
+
+    Raises:
+        GeometryError, TensionError, EquilibriumError: the robot cannot rest at the start.
+    """
+    modes = platform_modes(setup.robot, setup.start, "controlled", tensions=setup.tensions)
+    limit = step_limit(modes)
+    if setup.max_step <= limit.step:
+        return ""
+    wrong = step_error(limit.mode.eigenvalue, setup.max_step)
+    return (
+        f"{setup.label}: the integrator's step of {1e3 * setup.max_step:g} ms is too coarse for a "
+        f"mode at {limit.mode.frequency:.3g} Hz: it gets {100.0 * wrong:.0f} % of its motion "
+        f"wrong; {1e3 * limit.step:.2g} ms would do"
     )
 
 

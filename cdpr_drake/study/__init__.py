@@ -38,6 +38,7 @@ from cdpr_drake.study.stability import (
     warn_if_unstable,
 )
 from cdpr_drake.study.state_space import StateSpace
+from cdpr_drake.study.step_size import StepLimit, StepWarning, step_error, step_limit
 from cdpr_drake.study.sweep import Outcome, Sweep, sweep
 
 __all__ = [
@@ -60,6 +61,8 @@ __all__ = [
     "StabilityMap",
     "StabilityWarning",
     "StateSpace",
+    "StepLimit",
+    "StepWarning",
     "Sweep",
     "comparable_pose",
     "compare_cable_models",
@@ -84,6 +87,8 @@ __all__ = [
     "simulate_modes",
     "simulated_period_map",
     "stability_map",
+    "step_error",
+    "step_limit",
     "step_response",
     "sweep",
     "true_pose",
