@@ -9,14 +9,13 @@ from pydrake.common import RandomDistribution
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, LeafSystem, OutputPort
 from pydrake.systems.primitives import DiscreteTimeDelay, RandomSource, ZeroOrderHold
 
+from cdpr_drake.diagrams.eyes import add_pose_cameras, add_tangent_cameras, check_sensors
 from cdpr_drake.diagrams.robot import ROBOT_OUTPUTS, make_cable_robot
 from cdpr_drake.model.modelled import MODELLED
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.servo import ServoSettings
 from cdpr_drake.model.vision.outages import Outage
 from cdpr_drake.systems import (
-    CableTangentCameras,
-    CameraMeasurement,
     InverseKinematicsAngles,
     LoadCellFilter,
     ModelledTangents,
@@ -25,12 +24,7 @@ from cdpr_drake.systems import (
     PlausibleTension,
     PoseError,
     PositionBasedVisualServo,
-    StereoTangentCameras,
-    TargetCameras,
 )
-
-SENSORS = ("gaussian", "targets")
-"""What cameras deliver: the truth with Gaussian noise, or what follows from what they see."""
 
 NOISE_PERIOD = 0.05
 """How long a noise sample lasts in an all-continuous loop with noise [s]."""
@@ -78,7 +72,9 @@ def make_vision_based_control(
     k T + latency and are held. With sensors "targets" the camera blocks are `TargetCameras` and
     `StereoTangentCameras`, which sample by themselves, and the loop has their outputs num_targets,
     num_cameras, age, frames_lost and images_lost (of the pose), valid_tangents and
-    tangent_frames_lost too.
+    tangent_frames_lost too. With "images" they are `ImageTargets` and `StereoImageCameras`, a block
+    "pose_camera_images" renders for the former, and each image has a noise of its own:
+    pose_noise_1, ... instead of pose_noise.
 
     Args:
         robot: the true robot.
@@ -89,10 +85,12 @@ def make_vision_based_control(
         calibrated: the robot as the controller believes it; the true one if None.
         noise: whether to add named sources of measurement noise; otherwise noise ports are
             exported. Sources hold discrete and abstract state, which no linearisation takes.
-        sensors: "gaussian", or "targets" for a pose from the patterns' points in the images of the
-            pose cameras, and tangents from the cables' edges in those of the stereo pairs.
-        estimator: of the pose from targets, "joint" or "mean" (the paper's).
-        outages: when load cells are stuck or dead and, with targets, cameras see nothing.
+        sensors: "gaussian"; "targets" for a pose from the patterns' points in the images of the
+            pose cameras, and tangents from the cables' edges in those of the stereo pairs; or
+            "images" for points and edges detected in rendered and drawn images, at some tenths of a
+            second for each frame.
+        estimator: of the pose from targets or images, "joint" or "mean" (the paper's).
+        outages: when load cells are stuck or dead and, with targets or images, cameras see nothing.
         modelled: "tensions" and "tangents" that the law takes from the model at the measured pose:
             blocks "tension_model" and "tangent_model" instead of the sensors.
         settings: the law's other settings; its cable_model and gain give way to those above.
@@ -101,9 +99,10 @@ def make_vision_based_control(
 
     Raises:
         GeometryError: the cables cannot control all six degrees of freedom.
-        RobotFileError: with targets, the robot lacks the cameras or patterns they need.
+        RenderingError: with images, Drake cannot render on this machine.
+        RobotFileError: with targets or images, the robot lacks the cameras or patterns they need.
         ValueError: a gain, period or latency out of range; gain * sample_time >= 1; unknown
-            sensors; targets without sampling or without latency; what cannot be modelled.
+            sensors; targets or images without sampling or latency; what cannot be modelled.
     """
     believed = calibrated if calibrated is not None else robot
     k = robot.num_cables
@@ -114,29 +113,27 @@ def make_vision_based_control(
     fields = {**(vars(settings) if settings else {}), **servo}
     law = ServoSettings(**{**fields, "cable_model": cable_model, "gain": gain})
     check_sampling(gain, sample_time, latency)
-    with_targets = _check_sensors(sensors, sample_time, latency)
+    sees = check_sensors(sensors, sample_time, latency)
     check_modelled(modelled)
 
     builder = DiagramBuilder()
     plant = builder.AddNamedSystem("robot", make_cable_robot(robot))
-    seeing = CameraMeasurement(robot, believed)
-    if with_targets:
-        seeing = TargetCameras(robot, believed, sample_time, estimator, outages)
-    camera = builder.AddNamedSystem("camera", seeing)
+    pose = plant.GetOutputPort("pose")
+    camera, noise_ports = add_pose_cameras(
+        builder, pose, robot, believed, sensors, sample_time, estimator, outages
+    )
     tangents = cells = None
     if "tangents" not in modelled:
-        pairs = CableTangentCameras(robot)
-        if with_targets:
-            pairs = StereoTangentCameras(robot, believed, sample_time, outages)
-        tangents = builder.AddNamedSystem("tangent_cameras", pairs)
+        tangents = add_tangent_cameras(builder, robot, believed, sensors, sample_time, outages)
+        noise_ports["tangent_noise"] = tangents.GetInputPort("noise")
     if "tensions" not in modelled:
         cells = builder.AddNamedSystem("load_cells", LoadCellFilter(robot, believed, outages))
+        noise_ports["tension_noise"] = cells.GetInputPort("noise")
     servo_law = builder.AddNamedSystem("servo", PositionBasedVisualServo(believed, law))
     integrator = builder.AddNamedSystem("integrator", MotorAngleIntegrator(k))
     error = builder.AddNamedSystem("true_error", PoseError(robot))
 
-    builder.Connect(plant.GetOutputPort("pose"), camera.GetInputPort("pose"))
-    builder.Connect(plant.GetOutputPort("pose"), error.GetInputPort("pose"))
+    builder.Connect(pose, error.GetInputPort("pose"))
     measured = {"pose": camera.GetOutputPort("measured_pose")}
     if cells is None:
         model = builder.AddNamedSystem("tension_model", ModelledTension(believed))
@@ -148,7 +145,7 @@ def make_vision_based_control(
         measured["tension"] = cells.GetOutputPort("measured_tension")
     if tangents is not None:
         seen = {"tangents": plant.GetOutputPort("tangents_at_drawing_point")}
-        if with_targets:
+        if sees:
             seen["tension_at_drawing_point"] = plant.GetOutputPort("tension_at_drawing_point")
             seen |= {f"measured_{name}": port for name, port in measured.items()}
             builder.ExportOutput(tangents.GetOutputPort("valid_tangents"), "valid_tangents")
@@ -156,13 +153,13 @@ def make_vision_based_control(
         for name, port in seen.items():
             builder.Connect(port, tangents.GetInputPort(name))
         measured["tangents"] = tangents.GetOutputPort("measured_tangents")
-    if with_targets:
+    if sees:
         for name in ("num_targets", "num_cameras", "age", "frames_lost", "images_lost"):
             builder.ExportOutput(camera.GetOutputPort(name), name)
     rates = servo_law.GetOutputPort("motor_rates")
     if sample_time is not None:
-        held = {"pose", "tangents"} if with_targets else set()
-        if with_targets and cells is None:
+        held = {"pose", "tangents"} if sees else set()
+        if sees and cells is None:
             held.add("tension")
         measured, rates = _sample(builder, measured, held, rates, sample_time, latency)
     plausible = builder.AddNamedSystem("plausible_tension", PlausibleTension(believed))
@@ -182,10 +179,8 @@ def make_vision_based_control(
     _export_input(builder, "desired_pose", servo_law, error)
     builder.ExportInput(servo_law.GetInputPort("desired_twist"), "desired_twist")
     builder.ExportInput(plant.GetInputPort("external_wrench"), "external_wrench")
-    for name, system in (("pose", camera), ("tangent", tangents), ("tension", cells)):
-        if system is not None:
-            port = system.GetInputPort("noise")
-            _add_noise(builder, f"{name}_noise", port, noise, sample_time)
+    for name, port in noise_ports.items():
+        _add_noise(builder, name, port, noise, sample_time)
 
     builder.ExportOutput(servo_law.GetOutputPort("pose_error"), "pose_error_seen")
     builder.ExportOutput(error.GetOutputPort("pose_error"), "pose_error")
@@ -292,19 +287,6 @@ def check_modelled(modelled: tuple[str, ...]) -> None:
     for name in modelled:
         if name not in MODELLED or modelled.count(name) > 1:
             raise ValueError(f'cannot model "{name}"; known are {", ".join(MODELLED)}')
-
-
-def _check_sensors(sensors: str, sample_time: float | None, latency: float) -> bool:
-    """Return whether the sensors see targets; raise ValueError for what they cannot do."""
-    if sensors not in SENSORS:
-        raise ValueError(f'unknown sensors "{sensors}"; known are {", ".join(SENSORS)}')
-    if sensors != "targets":
-        return False
-    if sample_time is None:
-        raise ValueError("cameras that see targets take images: give a sample time")
-    if latency <= 0.0:
-        raise ValueError("cameras that see targets take time: the latency must be above 0")
-    return True
 
 
 def split_latency(sample_time: float, latency: float) -> tuple[int, float]:

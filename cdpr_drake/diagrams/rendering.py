@@ -60,12 +60,14 @@ def make_pose_camera_images(robot: CableRobot) -> Diagram:
         name: pose_camera_images
         input_ports:
         - pose
+        - noise_1, ... (optional), one per pose camera
         output_ports:
         - image_1, ..., one per pose camera
 
     pose is [roll, pitch, yaw, x, y, z] (rad, m) of X_WP; an image is an ImageRgba8U of the camera's
-    size, with its distortion. Blocks: "scene_graph", "pose_in_scene", and for each camera
-    "camera_1", Drake's RgbdSensor as a pinhole, and "lens_1". An image is rendered when asked for.
+    size, with its distortion; noise_1 is that of `LensDistortion`. Blocks: "scene_graph",
+    "pose_in_scene", and for each camera "camera_1", Drake's RgbdSensor as a pinhole, and "lens_1".
+    An image is rendered when asked for.
 
     Args:
         robot: the robot, for its pose cameras, patterns and drawing points.
@@ -87,7 +89,8 @@ def make_pose_camera_images(robot: CableRobot) -> Diagram:
         X_WC = robot.cameras.X_WF @ camera.X_FC
         sensor = builder.AddNamedSystem(f"camera_{number}", _sensor(X_WC, lens.lens.pinhole))
         builder.Connect(scene.get_query_output_port(), sensor.query_object_input_port())
-        builder.Connect(sensor.color_image_output_port(), lens.get_input_port())
+        builder.Connect(sensor.color_image_output_port(), lens.GetInputPort("pinhole_image"))
+        builder.ExportInput(lens.GetInputPort("noise"), f"noise_{number}")
         builder.ExportOutput(lens.get_output_port(), f"image_{number}")
     diagram = builder.Build()
     diagram.set_name("pose_camera_images")

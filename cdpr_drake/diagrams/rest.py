@@ -16,8 +16,8 @@ from cdpr_drake.model.equilibrium import RestState, forward_kinematics, rest_sta
 from cdpr_drake.model.inverse_kinematics import InverseKinematics, motor_angles
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, pose_to_vector
-from cdpr_drake.systems import StereoTangentCameras
 from cdpr_drake.systems.held_pose import HeldPose
+from cdpr_drake.systems.stereo import StereoCameras
 
 
 def rest_context(
@@ -104,7 +104,7 @@ def set_at_rest(diagram: Diagram, context: Context, rest: RestState) -> None:
 def _fill_samplers(systems: dict[tuple[str, ...], System], context: Context) -> None:
     """Fill holds and delay lines with what their input is now, cameras with what they see."""
     for path, system in systems.items():
-        if isinstance(system, HeldPose | StereoTangentCameras):
+        if isinstance(system, HeldPose | StereoCameras):
             system.set_at_rest(system.GetMyMutableContextFromRoot(context))
         if path[-1].startswith("sampled_") and isinstance(
             system, ZeroOrderHold | DiscreteTimeDelay

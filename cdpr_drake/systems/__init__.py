@@ -11,12 +11,14 @@ from cdpr_drake.systems.camera import (
     CameraMeasurement,
     CameraMeasurement_,
 )
+from cdpr_drake.systems.image_targets import ImageTargets
 from cdpr_drake.systems.joint_space import (
     ExponentialApproach,
     ExponentialApproach_,
     InverseKinematicsAngles,
     InverseKinematicsAngles_,
 )
+from cdpr_drake.systems.lens import LensDistortion
 from cdpr_drake.systems.load_cell import LoadCellFilter, LoadCellFilter_
 from cdpr_drake.systems.modelled import ModelledTangents, ModelledTension
 from cdpr_drake.systems.plausible_tension import PlausibleTension, PlausibleTension_
@@ -43,8 +45,10 @@ __all__ = [
     "CatenaryCableForce_",
     "ExponentialApproach",
     "ExponentialApproach_",
+    "ImageTargets",
     "InverseKinematicsAngles",
     "InverseKinematicsAngles_",
+    "LensDistortion",
     "LoadCellFilter",
     "LoadCellFilter_",
     "ModelledTangents",

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+from pydrake.common import RandomDistribution
 from pydrake.common.value import Value
 from pydrake.systems.framework import LeafSystem
 from pydrake.systems.sensors import ImageRgba8U
@@ -11,6 +13,7 @@ from pydrake.systems.sensors import ImageRgba8U
 from cdpr_drake.errors import GeometryError
 from cdpr_drake.model.vision.cameras import Intrinsics
 from cdpr_drake.model.vision.lens import Lens
+from cdpr_drake.systems._template import GAUSSIAN_INPUT
 
 
 class LensDistortion(LeafSystem):
@@ -21,12 +24,15 @@ class LensDistortion(LeafSystem):
         name: LensDistortion
         input_ports:
         - pinhole_image
+        - noise (optional)
         output_ports:
         - image
 
-    Both are abstract, of type ImageRgba8U. Drake renders neither distortion nor pixels that are not
-    square: the pinhole's image, `lens.pinhole` in size, is a little larger than the camera's, which
-    is interpolated from it (bilinearly, which blurs by half a pixel as a lens would).
+    The images are abstract, of type ImageRgba8U. Drake renders neither distortion nor pixels that
+    are not square: the pinhole's image, `lens.pinhole` in size, is a little larger than the
+    camera's, which is interpolated from it (bilinearly, which blurs by half a pixel as a lens
+    would). noise is one standard normal number, which seeds the noise of all pixels; the image is
+    without noise if the port is left open.
 
     Args:
         intrinsics: of the camera.
@@ -40,11 +46,14 @@ class LensDistortion(LeafSystem):
         super().__init__()
         self.intrinsics, self.lens = intrinsics, Lens(intrinsics)
         self._image_port = self.DeclareAbstractInputPort("pinhole_image", Value(ImageRgba8U()))
+        self._noise_port = self.DeclareVectorInputPort(
+            GAUSSIAN_INPUT, 1, RandomDistribution.kGaussian
+        )
         self.DeclareAbstractOutputPort(
             "image",
             lambda: Value(ImageRgba8U(intrinsics.width, intrinsics.height)),
             self._calc_image,
-            {self._image_port.ticket()},
+            {self._image_port.ticket(), self._noise_port.ticket()},
         )
 
     def _calc_image(self, context: Any, output: Any) -> None:
@@ -54,4 +63,7 @@ class LensDistortion(LeafSystem):
                 f"an image of {image.width()} x {image.height()} pixels came where the lens takes "
                 f"{pinhole.width} x {pinhole.height}"
             )
-        self.lens(image.data, output.get_mutable_value().mutable_data)
+        seed = None
+        if self._noise_port.HasValue(context):
+            seed = int(self._noise_port.Eval(context).view(np.uint64)[0])
+        self.lens(image.data, output.get_mutable_value().mutable_data, seed)

@@ -97,8 +97,9 @@ def find_near(
             lit: Any = cv2.findNonZero(bright)
             if lit is None:
                 return None
-            distance = np.hypot(lit[:, 0, 0] - (u - left), lit[:, 0, 1] - (v - top))
-            seed = tuple(lit[distance.argmin(), 0].tolist())
+            lit = lit.reshape(-1, 2)  # OpenCV 4 gives it another axis
+            distance = np.hypot(lit[:, 0] - (u - left), lit[:, 1] - (v - top))
+            seed = tuple(lit[distance.argmin()].tolist())
         size, _, _, box = cv2.floodFill(bright, None, seed, _MARK)
         if _fits(size, box, area, window.shape):
             centre = _centre(window, bright, box, (low, high))

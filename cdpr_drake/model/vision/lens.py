@@ -1,4 +1,4 @@
-"""What a lens does to an image: a pinhole's image, as a renderer draws it, to a camera's own."""
+"""What a camera makes of a pinhole's image, as a renderer draws it: distortion and noise."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ import numpy as np
 
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.model.rotations import Array
+from cdpr_drake.model.vision.cable_drawing import GREY_NOISE, QUANTILES
 from cdpr_drake.model.vision.cameras import Intrinsics
+
+_ZERO = 128  # the grey level that stands for no noise
 
 LARGEST = 3.0
 """A pinhole's image this many times as wide as the camera's would be beyond all use."""
@@ -36,19 +39,28 @@ class Pinhole:
 
 
 class Lens:
-    """Turns the image of a pinhole into that of a camera with distortion, by interpolation.
+    """Turns the image of a pinhole into that of a camera with distortion and noise.
 
     The pinhole has the camera's larger focal length, so that nothing is magnified, and sees all
-    that the camera does.
+    that the camera does. The noise of a pixel is white, and the same in all of its colours.
 
     Args:
         intrinsics: of the camera.
+        grey_noise: standard deviation of a pixel [grey levels of 256].
 
     Raises:
         RobotFileError: the distortion leads too far outside of what a pinhole can see.
+        ValueError: noise below 0.
     """
 
-    def __init__(self, intrinsics: Intrinsics) -> None:
+    def __init__(self, intrinsics: Intrinsics, grey_noise: float = GREY_NOISE) -> None:
+        from scipy.special import ndtri
+
+        if not grey_noise >= 0.0:
+            raise ValueError(f"noise must be >= 0, got {grey_noise}")
+        # Drawn by 16 random bits a pixel from as many equally likely values, around _ZERO.
+        levels = np.round(_ZERO + grey_noise * ndtri(QUANTILES))
+        self._levels = np.clip(levels, 0, 255).astype(np.uint8)
         rays = _rays(intrinsics)
         f = float(max(intrinsics.camera_matrix[0, 0], intrinsics.camera_matrix[1, 1]))
         reach = f * np.abs(rays).max(axis=(0, 1))
@@ -59,16 +71,23 @@ class Lens:
         self.pinhole = Pinhole(focal_length=f, width=width, height=height)
         self._map = (f * rays + self.pinhole.centre).astype(np.float32)
 
-    def __call__(self, image: Any, out: Any) -> None:
+    def __call__(self, image: Any, out: Any, seed: int | None = None) -> None:
         """Write the camera's image.
 
         Args:
-            image: (height, width, channels), uint8, of the pinhole.
-            out: (height, width, channels), uint8, of the camera.
+            image: (height, width, 4), uint8, of the pinhole.
+            out: (height, width, 4), uint8, of the camera.
+            seed: of the noise; none if None.
         """
         import cv2
 
         cv2.remap(image, self._map, None, cv2.INTER_LINEAR, dst=out)  # type: ignore[call-overload]
+        if seed is not None:
+            count = out.shape[0] * out.shape[1]
+            bits = np.random.SFC64(seed).random_raw(count // 4 + 1).view(np.uint16)[:count]
+            noise = self._levels[bits].reshape(out.shape[:2])
+            grey = cv2.merge([noise, noise, noise, np.full_like(noise, _ZERO)])
+            cv2.addWeighted(out, 1.0, grey, 1.0, -_ZERO, dst=out)
 
 
 def _rays(intrinsics: Intrinsics) -> Array:
