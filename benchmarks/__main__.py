@@ -18,6 +18,7 @@ FOLDER = Path(__file__).resolve().parent
 
 QUICK = {
     "catenary": ["--count", "100000"],
+    "images": ["--frames", "3", "--repeats", "3"],
     "loop": ["--repeats", "1"],
     "study": ["--duration", "10", "--robots", "3"],
     "vision": ["--repeats", "30"],

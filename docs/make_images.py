@@ -11,10 +11,22 @@ import shutil
 import tempfile
 from pathlib import Path
 
+from matplotlib.figure import Figure
+
 from cdpr_drake.__main__ import main
 from cdpr_drake.diagrams import make_vision_based_control
+from cdpr_drake.experiments.paper_tests import paper_test
+from cdpr_drake.model.catenary import elastic_catenary
+from cdpr_drake.model.equilibrium import rest_state
 from cdpr_drake.model.robot import load_robot
-from cdpr_drake.show import block_diagram, rates_and_responses_figure, screenshot_replay
+from cdpr_drake.model.vision.cable_drawing import CableDrawing
+from cdpr_drake.model.vision.lines import CableLines
+from cdpr_drake.show import (
+    block_diagram,
+    rates_and_responses_figure,
+    screenshot_replay,
+    stereo_view_figure,
+)
 from cdpr_drake.study import compare_cable_models
 
 IMAGES = Path(__file__).resolve().parent / "images"
@@ -27,6 +39,7 @@ def make_images() -> None:
     block_diagram(make_vision_based_control(load_robot("cogiro")), IMAGES / "loop.png")
     comparison = compare_cable_models(["cogiro", "cogiro-98m"])
     rates_and_responses_figure(comparison).savefig(IMAGES / "rates_and_responses.png", dpi=100)
+    stereo_view().savefig(IMAGES / "stereo_view.png", dpi=100)
     with tempfile.TemporaryDirectory() as folder:
         output = Path(folder) / "demo"
         if main(["run", "--output", str(output)]):
@@ -34,6 +47,20 @@ def make_images() -> None:
         for name in FIGURES:
             shutil.copy(output / name, IMAGES / name)
         screenshot_replay(output / "replay.html", IMAGES / "replay.png", at_time=8.0)
+
+
+def stereo_view() -> Figure:
+    """Return what the first stereo pair sees at the start of Test 4, and detects in it."""
+    robot = load_robot("cogiro")
+    X_WP, _ = paper_test(4).poses(robot)
+    lengths = rest_state(robot, X_WP).unstrained_length
+    ends = [X_WP @ p for p in robot.attachment_points] - robot.drawing_points
+    weight, cable = robot.weight_per_metre, robot.cable
+    hung = elastic_catenary(ends, lengths, weight, cable.stiffness, cable.drum_run)
+    tension = hung.tension_at_drawing_point
+    images = CableDrawing(robot)(hung.tangent_at_drawing_point, tension, seed=1)
+    edges = CableLines(robot)(images, tension, X_WP)
+    return stereo_view_figure(images[0], {n: edges[n - 1] for n in (1, 2)})
 
 
 if __name__ == "__main__":

@@ -27,6 +27,7 @@ from cdpr_drake.model.vision.cable_drawing import CABLE, PANEL, CableDrawing
 from cdpr_drake.model.vision.lines import CableLines
 from cdpr_drake.model.vision.outages import Outage
 from cdpr_drake.model.vision.tangents import CableImages, StereoGeometry, TangentEstimator
+from cdpr_drake.show import stereo_view_figure
 from cdpr_drake.systems import StereoImageCameras, StereoTangentCameras
 
 Images = list[Any]
@@ -396,6 +397,38 @@ def test_without_compiler_the_same_is_found(tmp_path: Path) -> None:
     compiled = lines([*drawn(1)[:1], None, None, None], T, CENTRE, turned(u, 1e-3))
     assert np.isfinite(plain[:2]).all()
     np.testing.assert_allclose(plain, compiled, atol=1e-9)
+
+
+# --- what is shown
+
+
+def test_the_figure_shows_both_images_and_magnifies_the_edges() -> None:
+    _, _, T, lines = scene()
+    images = drawn(1)
+    edges = lines(images, T, CENTRE)
+    figure = stereo_view_figure(images[0], {1: edges[0], 2: edges[1]})
+    assert [axes.get_title() for axes in figure.axes] == ["left camera", "right camera"]
+    for side, axes in enumerate(figure.axes):
+        np.testing.assert_array_equal(axes.images[0].get_array(), images[0][side])
+        circles = [line.get_xydata() for line in axes.lines]
+        np.testing.assert_array_equal(circles, edges[:2, side].mean(axis=1))
+        (inset,) = axes.child_axes
+        cable = int(inset.get_title().split()[-1])
+        np.testing.assert_array_equal(
+            [line.get_xydata() for line in inset.lines], edges[cable - 1, side]
+        )
+        # The inset hides no cable.
+        figure.draw_without_rendering()
+        box = inset.get_window_extent()
+        shown = axes.transData.transform(edges[:2, side].reshape(-1, 2))
+        assert box.width > 100.0
+        assert not any(box.contains(*point) for point in shown)
+
+
+def test_the_figure_shows_images_without_cables() -> None:
+    nothing = np.full((2, 2, 20, 2), np.nan)
+    figure = stereo_view_figure(drawn()[0], {1: nothing, 2: nothing})
+    assert not any(axes.lines or axes.child_axes for axes in figure.axes)
 
 
 # --- the system

@@ -15,6 +15,7 @@ from cdpr_drake.show.plots import (
 from cdpr_drake.show.replay import write_replay
 from cdpr_drake.show.screenshot import BrowserError, screenshot_replay
 from cdpr_drake.show.sensor_plots import ablation_figure
+from cdpr_drake.show.stereo_views import stereo_view_figure
 from cdpr_drake.show.study_plots import gain_map_figure, rates_and_responses_figure
 
 __all__ = [
@@ -36,6 +37,7 @@ __all__ = [
     "save_figures",
     "screenshot_replay",
     "stability_figure",
+    "stereo_view_figure",
     "tension_figure",
     "write_replay",
 ]
