@@ -22,6 +22,8 @@ from cdpr_drake.experiments.reproduction.words import count_of_claims, verdict
 CASES = "cases"
 """Folder in the output's with what has been computed."""
 
+INDENT = " " * len("  agrees  ")
+
 
 def reproduce_command(
     options: argparse.Namespace, known: Mapping[str, Reproduction] | None = None
@@ -97,11 +99,11 @@ def _print(report: Mapping[str, Any]) -> None:
         print()
         print_wrapped(section["title"])
         for key, (kind, message) in section["errors"].items():
-            print_wrapped(f"  failed   {key}: {kind}: {message}", indent=" " * 11)
+            print_wrapped(f"  failed  {key}: {kind}: {message}", indent=INDENT)
         for claim in section["claims"]:
-            print_wrapped(f"  {verdict(claim)}  {claim['text']}", indent=" " * 11)
+            print_wrapped(f"  {verdict(claim)}  {claim['text']}", indent=INDENT)
             numbers = f"paper: {claim['printed']}; here: {claim['ours']}"
-            print_wrapped(f"           {numbers}", indent=" " * 11)
+            print_wrapped(f"{INDENT}{numbers}", indent=INDENT)
     print()
     minutes = report["cpu_time_s"] / 60.0
     print_wrapped(f"{count_of_claims(report)} {minutes:.1f} minutes of processor time.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -59,7 +60,18 @@ def panel_svg(panel: Panel, salt: str) -> str:
             metadata={"Date": None, "Creator": None, "Format": None, "Type": None},
         )
     text = file.getvalue()
-    return text[text.index("<svg") :]
+    return _with_own_names(text[text.index("<svg") :].strip(), salt)
+
+
+def _with_own_names(svg: str, salt: str) -> str:
+    """Return an SVG element with only the names that it refers to, and those made its own."""
+    used = set(re.findall(r"(?:href=\"#|url\(#)([^\")]+)", svg))
+
+    def name(found: re.Match[str]) -> str:
+        return f' id="{salt}-{found[1]}"' if found[1] in used else ""
+
+    svg = re.sub(r' id="([^"]+)"', name, svg)
+    return re.sub(r'(href="#|url\(#)', rf"\g<1>{salt}-", svg)
 
 
 def _draw(axes: Any, panel: Panel) -> None:

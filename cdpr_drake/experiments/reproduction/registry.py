@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from typing import cast
 
-from cdpr_drake.experiments.reproduction import figures
+from cdpr_drake.experiments.reproduction import figure16, figures, table4, table6, table7
 from cdpr_drake.experiments.reproduction.section import Reproduction
 
 
 def reproductions() -> dict[str, Reproduction]:
     """Return all of them by name."""
-    parts = (*figures.FIGURES,)
+    of_tests = {part.name: part for part in figures.FIGURES}
+    parts = (
+        table4,
+        *(of_tests[name] for name in ("figure10", "figure11", "figure12")),
+        *(of_tests[name] for name in ("figure13", "figure14", "figure15")),
+        table6,
+        table7,
+        figure16,
+    )
     return {part.name: part for part in cast(tuple[Reproduction, ...], parts)}

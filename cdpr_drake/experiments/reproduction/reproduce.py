@@ -7,6 +7,7 @@ import hashlib
 import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from importlib import resources
 from importlib.metadata import version
@@ -51,6 +52,7 @@ def reproduce(
     folder: Path,
     *,
     jobs: int | None = None,
+    executor: Executor | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> tuple[list[Reproduced], float]:
     """Return what came of each table and figure, and the processor time of it all [s].
@@ -62,6 +64,7 @@ def reproduce(
         wanted: by name.
         folder: where results of cases are kept.
         jobs: processes; as many as cores if None.
+        executor: to run cases on in place of processes.
         progress: called with the number of cases done and of all.
 
     Raises:
@@ -75,6 +78,7 @@ def reproduce(
         [{"function": case.function, "arguments": dict(case.arguments)} for case in flat],
         seed=None,
         jobs=jobs,
+        executor=executor,
         batch=1,
         folder=folder,
         resume=True,

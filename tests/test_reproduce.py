@@ -1,0 +1,413 @@
+"""The paper made again: registry, what is taken from an earlier run, report, command."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+import subprocess
+from collections.abc import Iterator, Mapping
+from concurrent.futures import Executor, ThreadPoolExecutor
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import find_chromium
+from fake_paper import FakeTable
+
+from cdpr_drake.__main__ import main
+from cdpr_drake.commands import reproduce as command
+from cdpr_drake.experiments.reproduction import figures
+from cdpr_drake.experiments.reproduction import reproduce as machinery
+from cdpr_drake.experiments.reproduction.assumptions import printed
+from cdpr_drake.experiments.reproduction.registry import reproductions
+from cdpr_drake.experiments.reproduction.reproduce import report_of, reproduce
+from cdpr_drake.experiments.reproduction.section import Figure, Reproduction
+from cdpr_drake.experiments.reproduction.traces import difference, rate, sizes
+from cdpr_drake.experiments.reproduction.words import count_of_claims, in_words
+from cdpr_drake.show.paper_figures import panel_svg, paper_figure
+from cdpr_drake.show.report import report_html
+from cdpr_drake.study.sweep_store import fingerprint, name_of
+
+ROOT = Path(__file__).resolve().parents[1]
+VOID = {"meta", "br", "hr", "img", "link", "input"}
+
+
+@pytest.fixture
+def threads() -> Iterator[Executor]:
+    """Two threads."""
+    with ThreadPoolExecutor(2) as executor:
+        yield executor
+
+
+@pytest.fixture
+def fakes(tmp_path: Path) -> dict[str, Reproduction]:
+    """Two tables that share a case."""
+    log = tmp_path / "log"
+    return {
+        "one": FakeTable("one", [1.0, 2.0], log),
+        "two": FakeTable("two", [2.0, 3.0], log),
+    }
+
+
+def made(
+    wanted: Mapping[str, Reproduction], folder: Path, threads: Executor
+) -> tuple[dict[str, Any], dict[str, tuple[Figure, ...]]]:
+    """Return the report and the figures of what is wanted."""
+    found, cpu_time = reproduce(wanted, folder, executor=threads)
+    drawn = {part.name: part.section.figures for part in found if part.section is not None}
+    return report_of(found, cpu_time), drawn
+
+
+# --- the registry
+
+
+def test_the_registry_has_the_papers_tables_and_figures() -> None:
+    known = reproductions()
+    assert [name for name in known if name.startswith("figure")] == [
+        f"figure{n}" for n in (10, 11, 12, 13, 14, 15, 16)
+    ]
+    for name, part in known.items():
+        assert part.name == name and re.fullmatch(r"[a-z]+(_[a-z]+|\d+)?", name)
+
+
+@pytest.mark.parametrize("name", reproductions())
+def test_cases_can_be_handed_to_other_processes_and_kept(name: str) -> None:
+    cases = reproductions()[name].cases()
+    keys = [case.key for case in cases]
+    assert keys and len(set(keys)) == len(keys)
+    assert all(re.fullmatch(r"[\w.+-]+", key) for key in keys)
+    for case in cases:
+        assert name_of(case.function).startswith("cdpr_drake.")
+        assert fingerprint(dict(case.arguments))
+        json.dumps(dict(case.arguments))
+
+
+# --- running
+
+
+def test_equal_cases_of_two_sections_run_once(
+    fakes: dict[str, Reproduction], threads: Executor, tmp_path: Path
+) -> None:
+    report, _ = made(fakes, tmp_path / "kept", threads)
+    assert sorted((tmp_path / "log").read_text().split()) == ["1", "2", "3"]
+    assert [section["name"] for section in report["sections"]] == ["one", "two"]
+    assert [row[1:3] for row in report["sections"][1]["tables"][0]["rows"]] == [[2, 4], [3, 9]]
+    assert report["sections"][1]["assumptions"] == [
+        {"name": "modulus", "value": 60.0},
+        {"name": "points", "value": [1.0, 2.0]},
+    ]
+    assert count_of_claims(report) == "2 of 4 claims agree, 2 differ."
+
+
+def test_what_was_done_by_the_same_source_is_not_done_again(
+    fakes: dict[str, Reproduction],
+    threads: Executor,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    log, folder = tmp_path / "log", tmp_path / "kept"
+    made({"one": fakes["one"]}, folder, threads)
+    assert sorted(log.read_text().split()) == ["1", "2"]
+    made(fakes, folder, threads)
+    assert sorted(log.read_text().split()) == ["1", "2", "3"]
+    monkeypatch.setattr(machinery, "source_version", lambda: "changed")
+    made(fakes, folder, threads)
+    assert sorted(log.read_text().split()) == ["1", "1", "2", "2", "3", "3"]
+
+
+def test_the_version_changes_with_the_source_results_depend_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = tmp_path / "cdpr_drake"
+    for folder in ("model", "show"):
+        (package / folder).mkdir(parents=True)
+        (package / folder / "code.py").write_text("x = 1\n")
+    monkeypatch.setattr(machinery.resources, "files", lambda name: tmp_path / name)
+    version = machinery.source_version.__wrapped__
+    first = version()
+    (package / "show" / "code.py").write_text("x = 2\n")
+    assert version() == first
+    (package / "model" / "code.py").write_text("x = 2\n")
+    second = version()
+    assert second != first
+    (package / "model" / "data.yaml").write_text("x: 1\n")
+    assert version() not in (first, second)
+
+
+def test_a_case_that_fails_costs_its_section_only(threads: Executor, tmp_path: Path) -> None:
+    wanted = {"good": FakeTable("good", [1.0]), "bad": FakeTable("bad", [1.0, -1.0])}
+    report, drawn = made(wanted, tmp_path, threads)
+    good, bad = report["sections"]
+    assert good["claims"] and not good["errors"]
+    assert bad["errors"] == {"x1": ["ValueError", "-1 is negative"]} and not bad["claims"]
+    page = report_html(report, drawn)
+    assert "x1 failed: ValueError: -1 is negative" in page
+
+
+# --- the report
+
+
+class Page(HTMLParser):
+    """What is in a page; fails on tags that do not match."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.counts: dict[str, int] = {}
+        self.ids: list[str] = []
+        self.links: list[str] = []
+        self.text = ""
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Note a tag and what it refers to."""
+        self.counts[tag] = self.counts.get(tag, 0) + 1
+        if tag not in VOID:
+            self.open.append(tag)
+        for name, value in attrs:
+            if name == "id" and value:
+                self.ids.append(value)
+            if name in ("href", "src", "xlink:href", "srcset", "data", "action"):
+                self.links.append(value or "")
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Note a tag that is closed at once."""
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag: str) -> None:
+        """Close a tag."""
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        """Note text."""
+        self.text += data
+
+
+@pytest.fixture
+def page(fakes: dict[str, Reproduction], threads: Executor, tmp_path: Path) -> str:
+    """A report of the two tables."""
+    return report_html(*made(fakes, tmp_path / "kept", threads))
+
+
+def test_the_page_needs_nothing_else(page: str) -> None:
+    parsed = Page(page)
+    assert all(link.startswith("#") for link in parsed.links)
+    assert "link" not in parsed.counts and "script" not in parsed.counts
+    addresses = set(re.findall(r"https?://[^\"' <]+", page))
+    assert addresses <= {"http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"}
+    assert not re.search(r"@import|url\((?!#)", page)
+    assert len(parsed.ids) == len(set(parsed.ids))
+    assert {link[1:] for link in parsed.links} <= set(parsed.ids)
+
+
+def test_the_page_has_all_claims_tables_and_figures(page: str) -> None:
+    parsed = Page(page)
+    text = " ".join(parsed.text.split())
+    for part in (
+        "2 of 4 claims agree, 2 differ.", "Squares grow", "1 < 4", "One is <b>exact</b>", "3.14",
+        "2.72", "because of “rounding” & noise", "one: squares & <roots>", "A note.", "Made up.",
+        "One paragraph with <angles> & an ampersand.", "x^2 [-]",
+    ):  # fmt: skip
+        assert part in text, part
+    assert page.count('class="mark">agrees') == 2 and page.count('class="mark">differs') == 2
+    assert parsed.counts["svg"] == 4 and parsed.counts["table"] == 4
+    assert 'name="viewport"' in page and "prefers-color-scheme: dark" in page
+    assert "nan" not in text.lower().split()
+
+
+def test_the_same_results_give_the_same_page(
+    fakes: dict[str, Reproduction], threads: Executor, tmp_path: Path, page: str
+) -> None:
+    again = report_html(*made(fakes, tmp_path / "kept", threads))
+    assert again == page
+
+
+@pytest.mark.render
+@pytest.mark.needs("chromium")
+def test_the_page_fits_a_phone(page: str, tmp_path: Path) -> None:
+    outer = tmp_path / "outer.html"
+    outer.write_text(
+        f'<iframe id="f" width="390" height="800" srcdoc="{html.escape(page)}"></iframe>'
+        '<p id="w"></p>'
+        "<script>document.getElementById('f').onload = e => {"
+        "const d = e.target.contentDocument.documentElement;"
+        "const found = 'width ' + d.scrollWidth + ' of ' + d.clientWidth;"
+        "document.getElementById('w').textContent = found};"
+        "</script>",
+        encoding="utf-8",
+    )
+    browser = find_chromium()
+    assert browser is not None
+    dump = subprocess.run(
+        [
+            browser, "--headless=new", "--no-sandbox", "--disable-gpu", "--dump-dom",
+            "--host-resolver-rules=MAP * ~NOTFOUND", "--virtual-time-budget=3000",
+            f"--user-data-dir={tmp_path / 'profile'}", outer.as_uri(),
+        ],
+        capture_output=True, text=True, timeout=120, check=True,
+    ).stdout  # fmt: skip
+    found = re.search(r">width (\d+) of (\d+)", dump)
+    assert found is not None
+    content, screen = map(int, found.groups())
+    assert 300 < screen <= 390 and content <= screen
+
+
+def test_numbers_in_words() -> None:
+    cases = {
+        31.6: "31.6", -31.62: "-31.6", 0.0123: "0.0123", 1234.5: "1234", 0.0: "0", 50.0: "50",
+        4.35: "4.35", 1e-9: "1e-09", 7: "7", 123.4: "123", None: "", True: "yes", "a": "a",
+    }  # fmt: skip
+    for value, text in cases.items():
+        assert in_words(value) == text
+    assert in_words([1, 2.5]) == "1, 2.50" and in_words(float("nan")) == ""
+
+
+def test_pictures_say_what_they_show(fakes: dict[str, Reproduction]) -> None:
+    results = {f"x{i}": {"x": 1.0, "squares": np.ones(2)} for i in range(2)}
+    (figure,) = fakes["one"].section(results).figures
+    drawn = paper_figure(figure)
+    cables, runs = drawn.axes
+    assert cables.get_ylabel() == "tension [N]" and cables.get_xlabel() == "time [s]"
+    assert [t.get_text() for t in cables.texts] == ["1", "2", "3"]
+    legend = runs.get_legend()
+    assert legend is not None and legend.get_texts()[0].get_text() == "$t_x$"
+    text = panel_svg(figure.panels[0][0], "a")
+    assert text.startswith("<svg") and text == panel_svg(figure.panels[0][0], "a")
+
+
+# --- the paper's figures, from made-up runs
+
+
+def decay(gain: float, tension: np.ndarray, noise: float = 0.0) -> dict[str, Any]:
+    """Return a run whose error decays exponentially."""
+    time = np.linspace(0.0, 6.0 / gain, 200)
+    start = np.array([3000.0, -2000.0, 500.0, 5.0, -4.0, 1.0])
+    error = np.exp(-gain * time)[:, None] * start
+    error[:, :3] += noise
+    ones = np.ones((200, 1))
+    return {
+        "time": time,
+        "error": error,
+        "tension": ones * tension,
+        "dbeta": ones * 200.0 / tension,
+        "velocity": -gain * error[:, :3],
+        "gain": gain,
+    }
+
+
+def test_rates_and_differences_of_a_known_decay() -> None:
+    result = decay(0.03, np.ones(8))
+    assert rate(result) == pytest.approx(0.03, rel=1e-9)
+    assert sizes(result)[0] == pytest.approx([np.sqrt(13.25e6), np.sqrt(42.0)])
+    other = decay(0.03, np.ones(8), noise=10.0)
+    assert difference(result, other) == pytest.approx(np.sqrt(300.0 / 13.25e6))
+
+
+@pytest.mark.parametrize("part", figures.FIGURES, ids=lambda part: part.name)
+def test_a_figure_is_made_of_its_runs(part: figures.PaperFigure) -> None:
+    low, high = (np.array(t, float) for t in ([3, 3, 9, 9, 9, 9, 9, 9], [9, 9, 3, 3, 3, 3, 9, 9]))
+    results = {
+        case.key: decay(0.1, 100.0 * (high if case.arguments["number"] == 2 else low))
+        for case in part.cases()
+    }
+    section = part.section(results)
+    assert section.name == part.name and section.claims and len(section.figures) == 1
+    verdicts = {claim.text: claim.agrees for claim in section.claims}
+    for text, agrees in verdicts.items():
+        if "exponentially" in text or "least tensed" in text or "most tensed" in text:
+            assert agrees, text
+        if "moves by" in text or "larger in the experiments" in text:
+            assert not agrees, text
+    tensions = [p for row in section.figures[0].panels for p in row if "tension" in p.y_label]
+    assert all(len(panel.lines) == 8 for panel in tensions)
+    slow = {key: {**result, "gain": 0.2} for key, result in results.items()}
+    again = {claim.text: claim.agrees for claim in part.section(slow).claims}
+    assert not any(agrees for text, agrees in again.items() if "exponentially" in text)
+
+
+def test_amplitudes_agree_when_they_are_the_printed_ones() -> None:
+    part = figures.FIGURES[0]
+    result = decay(0.03, np.ones(8))
+    metres, degrees = printed("figures")["amplitude_1"].value
+    result["error"][0] = [1e3 * metres, 0.0, 0.0, degrees, 0.0, 0.0]
+    claims = part.section({part.cases()[0].key: result}).claims
+    assert claims[0].agrees and claims[0].ours == "4.35 m, 8.0°"
+
+
+# --- the command
+
+
+@pytest.fixture
+def screen(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A screen of 80 columns and an empty working directory."""
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.usefixtures("screen")
+def test_the_command_writes_a_report_and_tells_what_it_found(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    fakes = {"one": FakeTable("one", [1.0, 2.0]), "two": FakeTable("two", [-2.0])}
+    monkeypatch.setattr(command, "reproductions", lambda: fakes)
+    assert main(["reproduce", "--only", "one", "--jobs", "1"]) == 0
+    out, err = capfd.readouterr()
+    assert "2 of 2 cases, in " in err
+    lines = out.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert "  agrees  squares grow" in lines
+    assert "  differs  one is <b>exact</b>" in lines
+    assert "          paper: 3.14; here: 2.72" in lines
+    assert any(line.startswith("1 of 2 claims agree, 1 differ.") for line in lines)
+    assert lines[-1] == "In out/reproduction: report.html, report.json, one.png"
+    folder = tmp_path / "out" / "reproduction"
+    report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    assert [section["name"] for section in report["sections"]] == ["one"]
+    assert (folder / "one.png").read_bytes().startswith(b"\x89PNG")
+
+    assert main(["reproduce", "--json", "--jobs", "1"]) == 1  # the second has a case that fails
+    out, err = capfd.readouterr()
+    assert "3 of 3 cases, 2 of them earlier, in " in err
+    assert [section["name"] for section in json.loads(out)["sections"]] == ["one", "two"]
+    Page((folder / "report.html").read_text(encoding="utf-8"))
+
+
+@pytest.mark.usefixtures("screen")
+def test_an_interrupted_command_says_how_to_go_on(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted(*args: Any, progress: Any, **settings: Any) -> None:
+        progress(1, 2)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, "reproduce", interrupted)
+    assert main(["reproduce"]) == 130
+    err = capsys.readouterr().err
+    assert "1 of 2 cases" in err and "the same command goes on" in err
+
+
+@pytest.mark.usefixtures("screen")
+@pytest.mark.parametrize(
+    ("argv", "message"),
+    [
+        (["--only", "table99"], r'--only: no "table99"; there are .*figure10.*figure16'),
+        (["--jobs", "0"], r"--jobs: '0' is no number of processes"),
+        (["--jobs", "two"], r"--jobs: 'two' is no number of processes"),
+        (["--output", "file"], r"--output file: "),
+    ],
+)
+def test_bad_input_costs_one_line(
+    argv: list[str], message: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_text("")
+    assert main(["reproduce", *argv]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and len(err.splitlines()) == 1 and re.search(message, err)
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
