@@ -122,6 +122,8 @@ def describe(name: str, setup: Setup) -> str:
     noise = f"noise with seed {setup.seed}" if setup.noise else "no noise"
     if setup.sensors != "gaussian":
         noise = f"sensors: {setup.sensors} ({setup.estimator} estimate), {noise}"
+    if setup.calibrated is not None:
+        noise = f"a calibrated robot believed, {noise}"
     return (
         f"{what} on {setup.robot.name}, {setup.robot.mass:g} kg: {way:.2f} m and {turn:.1f} deg in "
         f"{setup.until:g} s, lambda = {setup.gain:g} 1/s, {loop}, {noise}."

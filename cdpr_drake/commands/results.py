@@ -39,6 +39,7 @@ def summarize(name: str, setup: Setup, runs: Sequence[Run]) -> dict[str, Any]:
         "gain_per_s": setup.gain,
         "sample_time_s": setup.sample_time,
         "latency_s": setup.latency,
+        "calibrated": setup.calibrated is not None,
         "noise": setup.noise,
         "sensors": setup.sensors,
         "estimator": setup.estimator,

@@ -132,20 +132,19 @@ def _hashable(value: Any) -> Any:
 
 def _convert(value: Any, kind: Any) -> Any:
     """The value as `kind`, without guessing: neither text nor truth values count as numbers."""
-    got = reprlib.repr(value)
     if kind is float:
         if isinstance(value, (bool, str)) or not hasattr(type(value), "__float__"):
-            raise TypeError(f"must be a number, got {got}")
+            raise TypeError(f"must be a number, got {reprlib.repr(value)}")
         return float(value)
     if kind is int:
         if isinstance(value, bool):
-            raise TypeError(f"must be a whole number, got {got}")
+            raise TypeError(f"must be a whole number, got {reprlib.repr(value)}")
         return operator.index(value)
     if kind is np.ndarray:
         try:
             array = np.array(value, dtype=float, order="C")
         except (TypeError, ValueError):
-            raise TypeError(f"must be an array of numbers, got {got}") from None
+            raise TypeError(f"must be an array of numbers, got {reprlib.repr(value)}") from None
         array.setflags(write=False)
         return array
     if is_record(kind) and kind.shorthand and not isinstance(value, kind):
@@ -159,4 +158,5 @@ def _convert(value: Any, kind: Any) -> Any:
         return dict(value)
     if isinstance(kind, type) and isinstance(value, kind):
         return value
-    raise TypeError(f"must be a {getattr(kind, '__name__', kind)}, got {got}")
+    name = getattr(kind, "__name__", kind)
+    raise TypeError(f"must be a {name}, got {reprlib.repr(value)}")

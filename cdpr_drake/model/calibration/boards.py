@@ -14,7 +14,7 @@ from cdpr_drake.model.calibration.tracker import at
 from cdpr_drake.model.rotations import Array, exp_rotation
 from cdpr_drake.model.vision.cameras import Intrinsics
 
-MOST_TRIES = 2000
+TRIES_PER_VIEW = 40
 MARGIN = 8.0  # of the image's edge, where no corner is looked for [px]
 TILT = np.radians(35.0)  # of the board about each axis of its plane, at most
 ROLL = np.radians(45.0)  # in its plane
@@ -89,7 +89,8 @@ def hold(
     found: list[RigidTransform] = []
     first = cameras[0][1]
     K = first.camera_matrix
-    for _ in range(MOST_TRIES):
+    tries = TRIES_PER_VIEW * count
+    for _ in range(tries):
         if len(found) == count:
             break
         tilt_x, tilt_y = generator.uniform(-TILT, TILT, 2)
@@ -103,7 +104,7 @@ def hold(
             found.append(X)
     if len(found) < count:
         raise CalibrationError(
-            f"a board is wholly in view in only {len(found)} of {MOST_TRIES} places tried; "
+            f"a board is wholly in view in only {len(found)} of {tries} places tried; "
             f"{count} are needed"
         )
     return found

@@ -100,7 +100,7 @@ def calibrate_camera(
         CalibrationError: too few views, all of them parallel, or a parameter that they do not
             determine.
     """
-    images = checked(board, images, width)
+    images = checked(board, images, width, height)
     camera, poses = first_guess(board, images, width, height)
     points = board.points
 
@@ -111,10 +111,10 @@ def calibrate_camera(
 
     start = _State(cameras=[camera], frames=[], poses=poses)
     names = [*PARAMETERS, *_pose_names(len(images))]
-    fit = minimise(start, blocks, _move, names)
+    fit = minimise(start, blocks, _move, names, shared=9)
     return CalibratedCamera(
         intrinsics=as_intrinsics(fit.state.cameras[0], width, height),
-        covariance=fit.covariance[:9, :9],
+        covariance=fit.covariance,
         X_CD=fit.state.poses,
         cost=fit.cost,
         freedom=fit.freedom,
@@ -143,7 +143,7 @@ def calibrate_pair(
         CalibrationError: too few views, all of them parallel, or a parameter that they do not
             determine.
     """
-    images = [checked(board, i, w) for i, (w, _) in zip((left, right), sizes, strict=True)]
+    images = [checked(board, i, *size) for i, size in zip((left, right), sizes, strict=True)]
     if len(images[0]) != len(images[1]):
         raise CalibrationError(f"{len(images[0])} left views, but {len(images[1])} right ones")
     starts = [first_guess(board, i, *size) for i, size in zip(images, sizes, strict=True)]
@@ -172,7 +172,7 @@ def calibrate_pair(
     names = [f"{name} of the {side} camera" for side in ("left", "right") for name in PARAMETERS]
     for frame in ("the right camera", "the pair in the tracker's frame")[: len(frames)]:
         names += [f"{name} of {frame}" for name in MOTION]
-    fit = minimise(start, blocks, _move, [*names, *_pose_names(len(X_LD))])
+    fit = minimise(start, blocks, _move, [*names, *_pose_names(len(X_LD))], shared=first)
     return _pair(fit, sizes)
 
 

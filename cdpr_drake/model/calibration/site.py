@@ -91,6 +91,9 @@ class _Held:
 class Site:
     """The true robot, the instruments, and their noise.
 
+    Attributes:
+        tracker: the laser tracker.
+
     Args:
         robot: the true robot.
         setup: how it is calibrated.
@@ -113,7 +116,7 @@ class Site:
             robot.drawing_points.mean(axis=0) * [1.0, 1.0, 0.0]
             + [0.1 * size[0], -0.4 * size[1], 1.5],
         )
-        self._tracker = LaserTracker(X_WS, setup.scale * setup.tracker_noise, generator)
+        self.tracker = LaserTracker(X_WS, setup.scale * setup.tracker_noise, generator)
 
     def see(self, eyes: PoseCamera | StereoPair) -> CalibratedCamera | CalibratedPair:
         """Return a pose camera or a stereo pair, `eyes`, from views of a board."""
@@ -135,7 +138,7 @@ class Site:
         X_WL = self._robot.cameras.X_WF @ pair.X_FL
         tracked = TrackedBoard(
             known=reflectors,
-            measured=self._tracker(
+            measured=self.tracker(
                 np.array([at(X_WL @ X, reflectors) for X in held.X_LD[: setup.tracked_views]])
             ),
             sigma=setup.tracker_noise,
@@ -148,11 +151,11 @@ class Site:
         """Return X_WS, A_i and their standard deviations, and B_i and theirs."""
         robot, setup = self._robot, self._setup
         references = corners(robot.drawing_points, floor=0.0)
-        X_SW = register(references, self._tracker(references), setup.tracker_noise)
+        X_SW = register(references, self.tracker(references), setup.tracker_noise)
         A, sigma_A = self._locate(X_SW, RigidTransform(), robot.drawing_points, setup.drawing_point)
         X_WP = platform_poses(robot, 1, 0.0)[0]  # where the platform stands to be measured
         nests = corners(robot.attachment_points)
-        X_SP = register(nests, self._tracker(at(X_WP, nests)), setup.tracker_noise)
+        X_SP = register(nests, self.tracker(at(X_WP, nests)), setup.tracker_noise)
         B, sigma_B = self._locate(X_SP, X_WP, robot.attachment_points, setup.attachment_point)
         return X_SW.inverse(), A, sigma_A, B, sigma_B
 
@@ -166,7 +169,7 @@ class Site:
         views = PlatformViews(
             sightings=[self._images(X, draw(self._images.noise_size)) for X in poses],
             known=nests,
-            measured=self._tracker(np.array([at(X, nests) for X in poses])),
+            measured=self.tracker(np.array([at(X, nests) for X in poses])),
             sigma=setup.tracker_noise,
             pixel_noise=max(robot.cameras.pixel_noise, LEAST_PIXEL_NOISE),
             pixel_bias=robot.cameras.pixel_bias,
@@ -202,6 +205,6 @@ class Site:
         setup, draw = self._setup, self._generator.standard_normal
         middles = points + setup.scale * bend * draw(points.shape)
         around = setup.scale * setup.cloud_noise * draw((setup.cloud, *points.shape))
-        measured = self._tracker(at(X, middles + around)).mean(axis=0)
+        measured = self.tracker(at(X, middles + around)).mean(axis=0)
         touch = (setup.cloud_noise**2 + setup.tracker_noise**2) / setup.cloud
         return locate(frame, measured, touch + bend**2)

@@ -109,7 +109,7 @@ def calibrate_transforms(
     X_SP = [register(views.known, q, views.sigma).X for q in views.measured]
     _check_turns(X_SP)
     bundle = _Bundle(robot, views, priors)
-    fit = minimise(bundle.start(X_SP), bundle.blocks, bundle.move, bundle.names)
+    fit = minimise(bundle.start(X_SP), bundle.blocks, bundle.move, bundle.names, bundle.shared)
     return bundle.result(fit.state, fit.covariance, fit.cost, fit.freedom)
 
 
@@ -146,7 +146,7 @@ class _Bundle:
         flat = [np.pad(p.points, ((0, 0), (0, 1))) for p in setup.patterns]
         self._points = np.vstack([at(p.X_MT, f) for p, f in zip(setup.patterns, flat, strict=True)])
         c, n = len(self._known), len(views.sightings)
-        self._c, self._first = c, 6 + 15 * c
+        self._c, self.shared = c, 6 + 15 * c
         of_cameras = [f"of pose camera {i + 1}" for i in range(c)]
         self.names = [
             *(f"{name} of the target frame" for name in MOTION),
@@ -191,7 +191,7 @@ class _Bundle:
 
     def move(self, state: _State, step: Array) -> _State:
         """Return a state after a step of the parameters."""
-        c, first = self._c, self._first
+        c, first = self._c, self.shared
         camera_steps = step[6 : 6 + 6 * c].reshape(-1, 6)
         changes = step[6 + 6 * c : first].reshape(-1, 9)
         pose_steps = step[first:].reshape(-1, 6)
@@ -206,7 +206,7 @@ class _Bundle:
         """Yield what reflectors, checkerboard and images have against a state."""
         views = self._views
         for k, X in enumerate(state.X_SP):
-            own = np.arange(self._first + 6 * k, self._first + 6 * k + 6)
+            own = np.arange(self.shared + 6 * k, self.shared + 6 * k + 6)
             r = (at(X, views.known) - views.measured[k]).ravel() / views.sigma
             yield r, turned_by(X, views.known).reshape(-1, 6) / views.sigma, own
         for c in range(self._c):
@@ -217,7 +217,7 @@ class _Bundle:
 
     def _images(self, state: _State, c: int) -> Block:
         """Return all that one camera sees in all poses; a bias ties one point's pixels together."""
-        views, first = self._views, self._first
+        views, first = self._views, self.shared
         rows, derivatives, which = [], [], []
         X_SC = state.X_SC[c]
         R_CS = X_SC.rotation().matrix().T

@@ -16,17 +16,19 @@ from cdpr_drake.model.vision.cameras import Intrinsics
 FEWEST_VIEWS = 3
 """Zhang's method needs three views of a plane for four intrinsics with some to spare."""
 
-LEAST_TILT = np.radians(2.0)
-"""Views of the board whose planes differ by less do not tell the focal length [rad]."""
+LEAST_TILT = np.radians(4.0)
+"""Views of the board whose planes differ by less do not tell the focal length [rad]; distortion
+makes parallel ones seem to differ by 2 degrees."""
 
 
-def checked(board: Board, images: Array, width: int) -> Array:
+def checked(board: Board, images: Array, width: int, height: int) -> Array:
     """Return the images as an array, if they can be used.
 
     Args:
         board: the board.
         images: (views, n, 2) [px], the corners.
         width: of the image [px].
+        height: of the image [px].
 
     Raises:
         CalibrationError: they have a wrong shape, are too few, or are all parallel.
@@ -41,7 +43,7 @@ def checked(board: Board, images: Array, width: int) -> Array:
         raise CalibrationError(
             f"a camera needs at least {FEWEST_VIEWS} views of the board, got {len(images)}"
         )
-    if _largest_tilt(board, images, width) < LEAST_TILT:
+    if _largest_tilt(board, images, width, height) < LEAST_TILT:
         raise CalibrationError(
             "all views of the board are parallel to each other: they do not tell the focal length; "
             "tilt the board"
@@ -49,17 +51,18 @@ def checked(board: Board, images: Array, width: int) -> Array:
     return images
 
 
-def _largest_tilt(board: Board, images: Array, width: int) -> float:
+def _largest_tilt(board: Board, images: Array, width: int, height: int) -> float:
     """Return the angle between the most different planes of the board [rad], roughly.
 
     A plane's line at infinity is seen where its normal says. Taking the image's width for the focal
-    length is good enough to tell parallel planes.
+    length, its middle for the principal point and no distortion is good enough to tell parallel
+    planes.
     """
     import cv2
 
     normals = []
     for image in images:
-        centred = (image - images.mean(axis=(0, 1))) / width
+        centred = (image - [0.5 * width, 0.5 * height]) / width
         H: Any = cv2.findHomography(board.points[:, :2], centred)[0]
         if H is None:
             raise CalibrationError("the corners of a view lie on one line")
@@ -86,6 +89,8 @@ def first_guess(
     import cv2
 
     points = [board.points.astype(np.float32)] * len(images)
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)  # several add up in any order, and no two answers are the same
     try:
         found: Any = cv2.calibrateCamera(
             points,
@@ -96,6 +101,8 @@ def first_guess(
         )
     except cv2.error as error:
         raise CalibrationError(f"OpenCV finds no camera that has these views: {error}") from None
+    finally:
+        cv2.setNumThreads(threads)
     _, K, distortion, turns, shifts = found
     poses = []
     for turn, shift in zip(turns, shifts, strict=True):
