@@ -19,6 +19,7 @@ FOLDER = Path(__file__).resolve().parent
 QUICK = {
     "catenary": ["--count", "100000"],
     "images": ["--frames", "3", "--repeats", "3"],
+    "integrators": ["--until", "4", "--rounds", "1"],
     "loop": ["--repeats", "1"],
     "study": ["--duration", "10", "--robots", "3"],
     "vision": ["--repeats", "30"],

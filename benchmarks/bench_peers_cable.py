@@ -17,7 +17,7 @@ from collections.abc import Callable, Sequence
 import mpmath
 import numpy as np
 
-from benchmarks.harness import Contestant, Report, Spread, interleave, ratio, run
+from benchmarks.harness import Contestant, Report, Spread, interleave, positive, ratio, run
 from cdpr_drake.model.catenary import elastic_catenary
 from cdpr_drake.model.robot import load_robot
 
@@ -156,9 +156,11 @@ def measure(report: Report, options: argparse.Namespace) -> None:
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add this benchmark's options."""
-    parser.add_argument("--count", type=int, default=20000, help="cables in one call")
-    parser.add_argument("--peer-count", type=int, default=200, help="of them, solved one by one")
-    parser.add_argument("--rounds", type=int, default=7)
+    parser.add_argument("--count", type=positive, default=20000, help="cables in one call")
+    parser.add_argument(
+        "--peer-count", type=positive, default=200, help="of them, solved one by one"
+    )
+    parser.add_argument("--rounds", type=positive, default=7)
     parser.add_argument("--seed", type=int, default=0)
 
 

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from pydrake.math import RollPitchYaw, RotationMatrix
 
-from benchmarks.harness import Contestant, Report, Spread, interleave, ratio, run
+from benchmarks.harness import Contestant, Report, Spread, interleave, positive, ratio, run
 from cdpr_drake.errors import CdprError, EquilibriumError
 from cdpr_drake.model.equilibrium import forward_kinematics, platform_balance, rest_state
 from cdpr_drake.model.kinematics import cable_geometry
@@ -246,9 +246,11 @@ def measure(report: Report, options: argparse.Namespace) -> None:
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add this benchmark's options."""
-    parser.add_argument("--count", type=int, default=10000, help="equilibria over the workspace")
-    parser.add_argument("--poses", type=int, default=5, help="that all solvers find")
-    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument(
+        "--count", type=positive, default=10000, help="equilibria over the workspace"
+    )
+    parser.add_argument("--poses", type=positive, default=5, help="that all solvers find")
+    parser.add_argument("--rounds", type=positive, default=3)
     parser.add_argument("--seed", type=int, default=0)
 
 

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from pydrake.systems.primitives import FirstOrderTaylorApproximation
 
-from benchmarks.harness import Contestant, Report, Spread, interleave, ratio, run
+from benchmarks.harness import Contestant, Report, Spread, interleave, positive, ratio, run
 from cdpr_drake.diagrams import make_vision_based_control
 from cdpr_drake.experiments.paper_tests import paper_test
 from cdpr_drake.model.robot import load_robot
@@ -133,7 +133,7 @@ def measure(report: Report, options: argparse.Namespace) -> None:
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add this benchmark's options."""
-    parser.add_argument("--rounds", type=int, default=15)
+    parser.add_argument("--rounds", type=positive, default=15)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

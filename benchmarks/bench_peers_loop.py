@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.harness import Contestant, Report, Spread, interleave, ratio, run
+from benchmarks.harness import Contestant, Report, Spread, interleave, positive, ratio, run
 from benchmarks.loop_case import noise_of, numbers_of
 from benchmarks.solve_ivp_loop import Noise, Simulation, Start
 from cdpr_drake.diagrams import simulate
@@ -151,7 +151,7 @@ def tell(
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add this benchmark's options."""
     parser.add_argument("--until", type=float, default=80.0, help="simulated time [s]")
-    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--rounds", type=positive, default=3)
     parser.add_argument("--cold", action="store_true", help="no round before that does not count")
 
 

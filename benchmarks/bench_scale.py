@@ -20,7 +20,7 @@ from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 
-from benchmarks.harness import Contestant, Report, Spread, interleave, ratio, run
+from benchmarks.harness import Contestant, Report, Spread, interleave, positive, ratio, run
 from cdpr_drake.diagrams import make_cable_robot, rest_context
 from cdpr_drake.experiments.runs import run as run_setup
 from cdpr_drake.experiments.runs import setup_of_test
@@ -165,8 +165,8 @@ def measure(report: Report, options: argparse.Namespace) -> None:
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add this benchmark's options."""
-    parser.add_argument("--rounds", type=int, default=7)
-    parser.add_argument("--calls", type=int, default=300, help="evaluations in a round")
+    parser.add_argument("--rounds", type=positive, default=7)
+    parser.add_argument("--calls", type=positive, default=300, help="evaluations in a round")
     parser.add_argument("--work", type=float, default=60.0, help="time of one process [s]; 0: none")
     parser.add_argument("--until", type=float, default=80.0, help="simulated time of a run [s]")
 

@@ -90,6 +90,14 @@ def ratio(above: Sequence[float], below: Sequence[float]) -> Spread:
     return Spread.of([a / b for a, b in zip(above, below, strict=True)])
 
 
+def positive(text: str) -> int:
+    """Return a positive number of a command line."""
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"at least 1, not {value}")
+    return value
+
+
 def is_installed(package: str) -> bool:
     """Whether a peer is there."""
     return importlib.util.find_spec(package) is not None

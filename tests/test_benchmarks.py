@@ -1,0 +1,111 @@
+"""The benchmarks run, at their smallest, and say what peers they leave out. No time is judged."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))  # behind what is installed
+
+from benchmarks import (
+    bench_peers_cable,
+    bench_peers_equilibrium,
+    bench_peers_linearize,
+    bench_peers_loop,
+    bench_scale,
+    harness,
+)
+
+ROOT = Path(__file__).resolve().parents[1]
+
+SMALLEST: dict[str, tuple[Any, str]] = {
+    "peers_cable": (bench_peers_cable, "--count 600 --peer-count 6 --rounds 1"),
+    "peers_equilibrium": (bench_peers_equilibrium, "--count 20 --poses 1 --rounds 1"),
+    "peers_linearize": (bench_peers_linearize, "--rounds 1"),
+    "peers_loop": (bench_peers_loop, "--until 0.3 --rounds 1 --cold"),
+    "scale": (bench_scale, "--rounds 1 --calls 5 --work 0"),
+}
+
+
+@pytest.mark.parametrize("peers", ["with peers", "without"])
+@pytest.mark.parametrize("name", SMALLEST)
+def test_a_benchmark_runs(
+    name: str, peers: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module, options = SMALLEST[name]
+    if peers == "without":
+        if name in ("peers_linearize", "scale"):
+            pytest.skip("has no peers that could be missing")
+        monkeypatch.setattr(harness, "is_installed", lambda package: False)
+    assert module.main([*options.split(), "--folder", str(tmp_path)]) == 0
+    written = json.loads((tmp_path / f"{name}.json").read_text())
+    assert written["command"] == f"python -m benchmarks {name} {options}"
+    assert written["tables"] and all(table["rows"] for table in written["tables"])
+    assert all(row["low"] <= row["median"] <= row["high"] for row in written["ratios"])
+    assert all(row.get("met", True) for row in written["figures"])
+    assert peers != "without" or any("not installed" in why for why in written["skipped"])
+
+
+def test_contestants_take_turns() -> None:
+    calls: list[str] = []
+
+    def note(name: str) -> Callable[[], None]:
+        return lambda: calls.append(name)
+
+    contestants = [harness.Contestant(name=n, call=note(n), units=2) for n in "ab"]
+    times = harness.interleave(contestants, rounds=3)
+    assert calls == list("ab" * 4)  # one round is not counted
+    assert {n: len(t) for n, t in times.items()} == {"a": 3, "b": 3}
+
+
+def test_what_a_call_needs_is_made_off_the_clock() -> None:
+    made, used = iter(range(9)), []
+    contestant = harness.Contestant(name="a", call=used.append, before=lambda: next(made))
+    harness.interleave([contestant], rounds=2, warm=0)
+    assert used == [0, 1]
+
+
+def test_a_ratio_is_formed_round_by_round() -> None:
+    spread = harness.ratio([2.0, 8.0, 30.0], [1.0, 2.0, 3.0])
+    assert (spread.low, spread.median, spread.high) == (2.0, 4.0, 10.0)
+
+
+def test_a_report_says_what_is_missed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def measure(report: harness.Report, _: argparse.Namespace) -> None:
+        report.ratio("a / b", harness.Spread(median=3.0, low=1.0, high=4.0), at_least=2.0)
+        report.figure("error", 2e-9, "m", at_most=1e-9)
+
+    report = harness.run(
+        "x", "Title.\n\nMore.", measure, lambda _: None, ["--folder", str(tmp_path)]
+    )
+    printed = capsys.readouterr().out
+    assert "a / b: 3 (1 to 4), wanted >= 2: met" in printed
+    assert "error: 2.0e-09 m, wanted <= 1.0e-09: MISSED" in printed
+    assert [row["met"] for row in (*report.ratios, *report.figures)] == [True, False]
+
+
+def test_the_machine_is_described_without_its_name() -> None:
+    import platform
+
+    described = harness.machine()
+    assert described["cores"] >= 1 and described["python"] and described["drake"]
+    assert platform.node() not in json.dumps(described).split()
+
+
+def test_the_command_passes_options_on() -> None:
+    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "benchmarks", *arguments]
+        return subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
+
+    passed_on = run("peers_cable", "--quick", "--nonsense", "3")
+    assert passed_on.returncode == 2
+    assert "peers_cable: error: unrecognized arguments: --nonsense 3" in passed_on.stderr
+    assert "no benchmark nothing" in run("nothing").stderr
+    assert "the name of one benchmark" in run("peers_cable", "scale", "--rounds", "3").stderr
