@@ -14,6 +14,9 @@ from pydrake.systems.framework import Context, Diagram
 from cdpr_drake.diagrams.rest import robot_of
 from cdpr_drake.diagrams.watch import WATCH_PERIOD, LimitWatch
 
+INTEGRATOR = "runge_kutta3"
+"""Default integrator, by Drake's name: the fastest to 1e-3 mm (benchmarks/bench_integrators.py)."""
+
 MAX_STEP = 0.01
 """Default step of the fixed-step Runge-Kutta 3 integrator [s]: six to a period of the winches."""
 
@@ -73,18 +76,23 @@ def make_simulator(
     *,
     max_step: float = MAX_STEP,
     accuracy: float | None = None,
+    integrator: str = INTEGRATOR,
 ) -> Simulator:
     """Return a simulator with the integrator that suits these diagrams.
 
     Args:
         diagram: the diagram.
         context: where it starts, e.g. from `rest_context`.
-        max_step: step of the fixed-step Runge-Kutta 3 integrator, or its largest step [s].
+        max_step: the integrator's step, its largest with error control [s].
         accuracy: for error control; fixed steps if None.
+        integrator: as Drake calls it.
+
+    Raises:
+        RuntimeError: Drake has no such integrator, or none with or without error control.
     """
     simulator = Simulator(diagram, context)
     config = SimulatorConfig()
-    config.integration_scheme = "runge_kutta3"
+    config.integration_scheme = integrator
     config.max_step_size = max_step
     config.start_time = context.get_time()  # which applying the configuration would set to 0
     config.use_error_control = accuracy is not None
@@ -103,6 +111,7 @@ def simulate(
     every: float = 0.05,
     max_step: float = MAX_STEP,
     accuracy: float | None = None,
+    integrator: str = INTEGRATOR,
     progress: Callable[[float], None] | None = None,
 ) -> Record:
     """Run a diagram to a time and return what was recorded.
@@ -115,6 +124,7 @@ def simulate(
         every: period of the record [s].
         max_step: step of the integrator [s].
         accuracy: for error control; fixed steps if None.
+        integrator: as Drake calls it.
         progress: called with the time at each record.
 
     Raises:
@@ -132,7 +142,9 @@ def simulate(
     watch = LimitWatch(robot_of(diagram))
     pose = diagram.GetOutputPort("pose")
     tension = diagram.GetOutputPort("tension_at_drawing_point")
-    simulator = make_simulator(diagram, context, max_step=max_step, accuracy=accuracy)
+    simulator = make_simulator(
+        diagram, context, max_step=max_step, accuracy=accuracy, integrator=integrator
+    )
     begun = time.perf_counter()
     simulator.Initialize()
     for t, is_record in _stops(context.get_time(), until, every):
