@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from typing import cast
 
-from cdpr_drake.experiments.reproduction import figure16, figures, table4, table6, table7
+from cdpr_drake.experiments.reproduction import (
+    cable_modes,
+    figure16,
+    figures,
+    slips,
+    table4,
+    table6,
+    table7,
+)
 from cdpr_drake.experiments.reproduction.section import Reproduction
 
 
@@ -18,5 +26,7 @@ def reproductions() -> dict[str, Reproduction]:
         table6,
         table7,
         figure16,
+        slips,
+        cable_modes,
     )
     return {part.name: part for part in cast(tuple[Reproduction, ...], parts)}
