@@ -33,8 +33,8 @@ from cdpr_drake.model.calibration_errors import CalibrationErrors, misjudged
 from cdpr_drake.model.rotations import Array, as_pose
 from cdpr_drake.study.equilibrium import true_from_seen
 
-MAX_STEP = 0.02
-"""Of the integrator [s]; ends and convergence times are those of 0.01 s to 0.03 mm and 0.1 ms."""
+MAX_STEP = 0.0134
+"""Of the integrator [s]: four steps to a frame; ends are those of five to 0.03 mm."""
 
 REST = 300.0
 """By then a gain of 0.03 1/s has left 0.5 mm of Test 1's 4.35 m [s]."""
