@@ -14,7 +14,7 @@ from cdpr_drake.show.plots import (
 )
 from cdpr_drake.show.replay import write_replay
 from cdpr_drake.show.screenshot import BrowserError, screenshot_replay
-from cdpr_drake.show.sensor_plots import ablation_figure
+from cdpr_drake.show.sensor_plots import ablation_figure, calibration_study_figure
 from cdpr_drake.show.stereo_views import stereo_view_figure
 from cdpr_drake.show.study_plots import gain_map_figure, rates_and_responses_figure
 
@@ -26,6 +26,7 @@ __all__ = [
     "block_diagram_dot",
     "cable_sag",
     "calibration_figure",
+    "calibration_study_figure",
     "error_norm_figure",
     "gain_map_figure",
     "mode_shape_figure",
