@@ -82,7 +82,8 @@ def _digits(value: float) -> str:
 
 
 def _meaning(found: Calibration) -> str:
-    noise = f"{found.setup.scale:g} times the usual noise" if found.setup.scale else "no noise"
+    scale = found.setup.scale
+    noise = {0.0: "no noise", 1.0: "the usual noise"}.get(scale, f"{scale:g} times the usual noise")
     return (
         f"{found.true.name} calibrated with {noise}, seed {found.seed}: calibrated less true, and "
         "the standard deviation that the measurements predict. A_i and B_i are known as well as "
