@@ -62,11 +62,13 @@ class Lens:
         levels = np.round(_ZERO + grey_noise * ndtri(QUANTILES))
         self._levels = np.clip(levels, 0, 255).astype(np.uint8)
         rays = _rays(intrinsics)
+        if rays is None:
+            raise RobotFileError("camera", "distortion", "no pinhole sees what this lens does")
         f = float(max(intrinsics.camera_matrix[0, 0], intrinsics.camera_matrix[1, 1]))
         reach = f * np.abs(rays).max(axis=(0, 1))
         size = np.array([intrinsics.width, intrinsics.height])
         if not np.all(reach <= 0.5 * LARGEST * size):
-            raise RobotFileError("camera", "distortion", "a pinhole cannot see what this lens does")
+            raise RobotFileError("camera", "distortion", "no pinhole sees what this lens does")
         width, height = (2 * int(np.ceil(r + 1.0)) for r in reach)
         self.pinhole = Pinhole(focal_length=f, width=width, height=height)
         self._map = (f * rays + self.pinhole.centre).astype(np.float32)
@@ -90,16 +92,22 @@ class Lens:
             cv2.addWeighted(out, 1.0, grey, 1.0, -_ZERO, dst=out)
 
 
-def _rays(intrinsics: Intrinsics) -> Array:
-    """Return (height, width, 2): where each pixel's ray meets the plane z = 1."""
+def _rays(intrinsics: Intrinsics) -> Array | None:
+    """Return (height, width, 2): where each pixel's ray meets the plane z = 1.
+
+    None where there is no such ray: the distortion takes no direction there.
+    """
     import cv2
 
     u, v = np.meshgrid(np.arange(float(intrinsics.width)), np.arange(float(intrinsics.height)))
     criteria = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 50, 1e-9)
-    rays: Any = cv2.undistortPoints(
-        np.stack([u.ravel(), v.ravel()], axis=1)[:, None],
-        intrinsics.camera_matrix,
-        intrinsics.distortion,
-        criteria=criteria,
+    pixels = np.stack([u.ravel(), v.ravel()], axis=1)
+    matrix, distortion = intrinsics.camera_matrix, intrinsics.distortion
+    rays: Any = cv2.undistortPoints(pixels[:, None], matrix, distortion, criteria=criteria)
+    zero = np.zeros(3)
+    back, _ = cv2.projectPoints(
+        cv2.convertPointsToHomogeneous(rays), zero, zero, matrix, distortion
     )
+    if not np.abs(back[:, 0] - pixels).max() < 1e-3:
+        return None
     return rays.reshape(intrinsics.height, intrinsics.width, 2)

@@ -25,7 +25,7 @@ in sides of those three's triangle."""
 NEAR = 10.0
 """Spots this near to where a point should be speak for a pose [px]."""
 
-MOST_SPOTS = 60
+MOST_SPOTS = 30
 """No more spots of an image than this are combined: the largest."""
 
 
@@ -97,9 +97,7 @@ def labellings(points: Array, pixels: Array) -> list[NDArray[np.intp]]:
     """
     if len(pixels) < len(points):
         return []
-    base = max(itertools.combinations(range(len(points)), 3), key=lambda i: _area(points, i))
-    if np.cross(*(points[list(base[1:])] - points[base[0]])) < 0.0:
-        base = (base[0], base[2], base[1])
+    base = max(itertools.permutations(range(len(points)), 3), key=lambda i: _area(points, i))
     rest = [i for i in range(len(points)) if i not in base]
     expected = (points[rest] - points[base[0]]) @ np.linalg.inv(
         points[list(base[1:])] - points[base[0]]
@@ -128,9 +126,9 @@ def labellings(points: Array, pixels: Array) -> list[NDArray[np.intp]]:
 
 
 def _area(points: Array, corners: tuple[int, ...]) -> float:
-    """Return the area of a triangle of points."""
-    a, b, c = points[list(corners)]
-    return abs(float((b - a)[0] * (c - a)[1] - (b - a)[1] * (c - a)[0]))
+    """Return twice the area of a triangle of points, above 0 if they go round anticlockwise."""
+    (a, b), (c, d) = points[list(corners[1:])] - points[corners[0]]
+    return float(a * d - b * c)
 
 
 def _angle(A: RotationMatrix, B: RotationMatrix) -> float:
