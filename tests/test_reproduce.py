@@ -6,6 +6,7 @@ import html
 import json
 import re
 import subprocess
+import sys
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor, ThreadPoolExecutor
 from html.parser import HTMLParser
@@ -19,7 +20,7 @@ from fake_paper import FakeTable
 
 from cdpr_drake.__main__ import main
 from cdpr_drake.commands import reproduce as command
-from cdpr_drake.experiments.reproduction import figures
+from cdpr_drake.experiments.reproduction import figures, sources
 from cdpr_drake.experiments.reproduction import reproduce as machinery
 from cdpr_drake.experiments.reproduction.assumptions import printed
 from cdpr_drake.experiments.reproduction.registry import reproductions
@@ -113,28 +114,66 @@ def test_what_was_done_by_the_same_source_is_not_done_again(
     assert sorted(log.read_text().split()) == ["1", "2"]
     made(fakes, folder, threads)
     assert sorted(log.read_text().split()) == ["1", "2", "3"]
-    monkeypatch.setattr(machinery, "source_version", lambda: "changed")
+    monkeypatch.setattr(machinery, "source_of", lambda function: "changed")
     made(fakes, folder, threads)
     assert sorted(log.read_text().split()) == ["1", "1", "2", "2", "3", "3"]
 
 
-def test_the_version_changes_with_the_source_results_depend_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    package = tmp_path / "cdpr_drake"
-    for folder in ("model", "show"):
-        (package / folder).mkdir(parents=True)
-        (package / folder / "code.py").write_text("x = 1\n")
-    monkeypatch.setattr(machinery.resources, "files", lambda name: tmp_path / name)
-    version = machinery.source_version.__wrapped__
-    first = version()
-    (package / "show" / "code.py").write_text("x = 2\n")
-    assert version() == first
-    (package / "model" / "code.py").write_text("x = 2\n")
-    second = version()
-    assert second != first
-    (package / "model" / "data.yaml").write_text("x: 1\n")
-    assert version() not in (first, second)
+def test_a_source_changes_with_the_code_and_data_it_depends_on(tmp_path: Path) -> None:
+    package = tmp_path / "ours"
+    files = {
+        "__init__.py": "",
+        "runs.py": "from ours.model import robot\ndef run(): return robot.mass, load('table4')\n",
+        "model/__init__.py": "",
+        "model/robot.py": "import numpy\nmass = 1\n",
+        "model/other.py": "import ours.runs\nx = 1\n",
+        "assumptions.yaml": "table4: {a: 1}\ntable5: {a: 1}\n",
+        "robot.yaml": "mass: 1\n",
+    }
+    changes = {
+        "runs.py": files["runs.py"] + "y = 1\n",
+        "model/__init__.py": "from ours.model import other\n",
+        "model/robot.py": "import numpy\nmass = 2\n",
+        "assumptions.yaml": "table4: {a: 2}\ntable5: {a: 1}\n",
+        "robot.yaml": "mass: 2\n",
+    }
+    harmless = {
+        "model/other.py": "x = 2\n",
+        "model/robot.py": "import numpy  # a comment\n\nmass = 1\n",
+        "assumptions.yaml": "table5: {a: 2}\ntable4: {a: 1}\n",
+    }
+
+    def source(number: int, changed: dict[str, str]) -> str:
+        copy = package.parent / str(number) / "ours"
+        for name, text in {**files, **changed}.items():
+            (copy / name).parent.mkdir(parents=True, exist_ok=True)
+            (copy / name).write_text(text)
+        return sources._source_of_module("ours.runs", copy)
+
+    first = source(0, {})
+    number = 0
+    for name, text in changes.items():
+        number += 1
+        assert source(number, {name: text}) != first, name
+    for name, text in harmless.items():
+        number += 1
+        assert source(number, {name: text}) == first, name
+
+
+def test_a_source_knows_all_that_comes_with_a_module() -> None:
+    found = sources.imported_by("cdpr_drake.experiments.reproduction.traces")
+    for name in ("experiments.runs", "model.kernels.catenary", "systems.servo", "study.stability"):
+        assert f"cdpr_drake.{name}" in found
+    assert "cdpr_drake.experiments.reproduction.figures" not in found
+    assert not any(name.startswith("cdpr_drake.show") for name in found)
+    code = (
+        "import sys, cdpr_drake.experiments.reproduction.traces\n"
+        "print(*(n for n in sys.modules if n.partition('.')[0] == 'cdpr_drake'))"
+    )
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert set(loaded.stdout.split()) <= found
 
 
 def test_a_case_that_fails_costs_its_section_only(threads: Executor, tmp_path: Path) -> None:

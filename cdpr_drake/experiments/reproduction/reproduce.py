@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import functools
-import hashlib
 import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from importlib import resources
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -20,10 +17,8 @@ from cdpr_drake import __version__
 from cdpr_drake.batch import plain
 from cdpr_drake.experiments.reproduction.assumptions import Assumption, assumptions
 from cdpr_drake.experiments.reproduction.section import Case, Reproduction, Result, Section
+from cdpr_drake.experiments.reproduction.sources import source_of
 from cdpr_drake.study import Sweep, sweep
-
-NOT_BEHIND_RESULTS = ("commands", "show", "__main__.py")
-"""What of the package no result of a case depends on."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +53,7 @@ def reproduce(
     """Return what came of each table and figure, and the processor time of it all [s].
 
     Cases of equal function and arguments run once, and not at all if the folder has their results
-    by the same source.
+    by the same code.
 
     Args:
         wanted: by name.
@@ -75,14 +70,20 @@ def reproduce(
     flat = [case for part in cases.values() for case in part]
     done = sweep(
         carry_out,
-        [{"function": case.function, "arguments": dict(case.arguments)} for case in flat],
+        [
+            {
+                "function": case.function,
+                "arguments": dict(case.arguments),
+                "source": source_of(case.function),
+            }
+            for case in flat
+        ],
         seed=None,
         jobs=jobs,
         executor=executor,
         batch=1,
         folder=folder,
         resume=True,
-        version=source_version(),
         progress=progress,
     )
     found, first = [], 0
@@ -93,12 +94,13 @@ def reproduce(
     return found, _cpu_time(done)
 
 
-def carry_out(function: Callable[..., Result], arguments: Mapping[str, Any]) -> Result:
+def carry_out(function: Callable[..., Result], arguments: Mapping[str, Any], source: str) -> Result:
     """Return function(**arguments); in a worker.
 
     Args:
         function: of a case.
         arguments: of a case.
+        source: which makes cases of changed code different ones.
     """
     return function(**arguments)
 
@@ -132,18 +134,6 @@ def _cpu_time(done: Sweep) -> float:
     return sum({id(o.result): o.cpu_time for o in done.outcomes}.values())
 
 
-@functools.cache
-def source_version() -> str:
-    """Return a text that changes with whatever a result may depend on: our source, and Drake's."""
-    digest = hashlib.sha256(f"{__version__} {version('drake')} {np.__version__}".encode())
-    package = Path(str(resources.files("cdpr_drake")))
-    for path in sorted([*package.rglob("*.py"), *package.rglob("*.yaml")]):
-        place = path.relative_to(package)
-        if place.parts[0] not in NOT_BEHIND_RESULTS:
-            digest.update(place.as_posix().encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
 # --- the report
 
 
@@ -161,7 +151,6 @@ def report_of(found: Sequence[Reproduced], cpu_time: float) -> dict[str, Any]:
         "cdpr_drake": __version__,
         "drake": version("drake"),
         "python": platform.python_version(),
-        "source": source_version(),
         "cpu_time_s": round(cpu_time, 1),
         "made": time.strftime("%Y-%m-%d", time.gmtime()),
         "sections": [_entry(part) for part in found],
