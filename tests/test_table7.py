@@ -91,7 +91,7 @@ def test_the_cable_gets_thicker_and_the_platform_larger(values: dict[str, Any]) 
     assert robot.mass == values["mass"]
 
 
-def test_what_is_left_is_printed_s_order_and_size(slow: np.ndarray) -> None:
+def test_what_is_left_has_the_order_and_size_printed(slow: np.ndarray) -> None:
     assert np.all(np.diff(slow[:, 0]) > 0.0)
     assert slow[3, 0] > 3.0 * slow[0, 0]
     assert np.exp(np.abs(np.log(slow / printed_errors()))).max() < 1.5

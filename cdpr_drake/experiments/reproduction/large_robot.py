@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from typing import Any
 
@@ -37,7 +38,7 @@ def true_robot(values: Mapping[str, Any]) -> CableRobot:
         values: linear_density [kg/m], platform_scale [-], mass [kg], modulus [GPa], drum_run [m],
             damping_time [s].
     """
-    robot = load_robot("cogiro-98m")
+    robot = _robot_of_the_file()
     scale, cable, platform = values["platform_scale"], robot.cable, robot.platform
     thicker = values["linear_density"] / cable.linear_density
     section = cable.section * thicker
@@ -62,6 +63,11 @@ def true_robot(values: Mapping[str, Any]) -> CableRobot:
             damping_time=values["damping_time"],
         ),
     )
+
+
+@functools.cache
+def _robot_of_the_file() -> CableRobot:
+    return load_robot("cogiro-98m")
 
 
 def believed_robot(robot: CableRobot, values: Mapping[str, Any]) -> CableRobot:
