@@ -10,6 +10,7 @@ from cdpr_drake.experiments.reproduction import (
     figures,
     slips,
     table4,
+    table5,
     table6,
     table7,
 )
@@ -22,6 +23,7 @@ def reproductions() -> dict[str, Reproduction]:
     parts = (
         table4,
         *(of_tests[name] for name in ("figure10", "figure11", "figure12")),
+        table5,
         *(of_tests[name] for name in ("figure13", "figure14", "figure15")),
         table6,
         table7,
