@@ -192,12 +192,14 @@ def _comparison(results: Mapping[str, Result], ours: Array) -> Table:
     return Table(
         title="Final errors, means of three axes",
         headings=(
-            "model", "paper [mm]", "ours [mm]", "ours over paper",
-            "paper [deg]", "ours [deg]", "ours over paper", "without dynamics [mm]",
+            "model", "paper [mm]", "ours [mm]", "ours over paper", "paper, above ECM [mm]",
+            "ours, above ECM [mm]", "paper [deg]", "ours [deg]", "ours over paper",
+            "ours without dynamics [mm]",
         ),
         rows=tuple(
             (
                 model, theirs[i, 0], ours[i, 0], ours[i, 0] / theirs[i, 0],
+                theirs[i, 0] - theirs[0, 0], ours[i, 0] - ours[0, 0],
                 theirs[i, 1], ours[i, 1], ours[i, 1] / theirs[i, 1], slow[i, 0],
             )
             for i, model in enumerate(MODELS)
