@@ -55,7 +55,7 @@ def turned(u: np.ndarray, angle: float, seed: int = 0) -> np.ndarray:
 
 def across(edges: np.ndarray, exact: np.ndarray) -> np.ndarray:
     """How far points lie beside the exact edges (k, 2, 2, n) [px]."""
-    along = exact[..., -1:, :] - exact[..., :1, :]
+    along = np.gradient(exact, axis=-2)
     along = along / np.linalg.norm(along, axis=-1, keepdims=True)
     d = edges - exact
     return np.abs(d[..., 0] * along[..., 1] - d[..., 1] * along[..., 0])
@@ -87,8 +87,8 @@ def covered(robot: CableRobot, cable: int, station: float, shape: tuple[int, int
     x = (x0 + np.arange(shape[1])[:, None] + step).ravel()
     y = (y0 + np.arange(shape[0])[:, None] + step).ravel()
     pixels = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    plane = np.empty_like(pixels)
-    vision.undistorted(camera, pixels, plane)
+    lens = robot.cameras.stereo_pairs[geometry.pairs[cable]].left
+    plane = cv2.undistortPoints(pixels[:, None], lens.camera_matrix, lens.distortion)[:, 0]
     R = camera[:9].reshape(3, 3)
     rays = np.column_stack([plane, np.ones(len(plane))]) @ R
     normals = np.cross(rays, tangent)

@@ -23,7 +23,7 @@ from cdpr_drake.model.kernels.stereo import to_pixels
 from cdpr_drake.model.kernels.vision import distort, undistort
 
 MARGIN = 3  # px beside the dark run that an edge's blur may reach
-THIN = 2.5  # px; a narrower band may have no pixel that is wholly dark
+THIN = 3.0  # px; a narrower band may have no pixel that is wholly dark
 LIKELY_WIDTHS = (0.5, 1.6)  # of a band, in expected ones; two cables that cross are wider
 FEWEST = 0.5  # part of the scans that must agree on a line
 STEPS = 5  # of reweighting

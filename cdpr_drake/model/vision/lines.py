@@ -28,7 +28,7 @@ BIN = 0.005
 FEWEST_PIXELS = 30
 """Dark pixels that make a line."""
 
-MOST_PIXELS = 3000
+MOST_PIXELS = 1500
 """Dark pixels that a search looks at; of more an even choice."""
 
 
