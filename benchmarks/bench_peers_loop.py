@@ -28,7 +28,8 @@ from cdpr_drake.model.kernels import is_compiled
 
 REFERENCE_STEP = 5e-4
 MUJOCO_STEP = 1e-3
-MAX_ERROR = 1e-3  # mm
+MAX_ERROR = 1e-3  # mm, of the final position
+SETTLED = 60.0  # s, after which the platform is close to the goal
 AGREE = 1e-6  # m, in every frame
 OURS, SCRIPT, MUJOCO, BOUND = "ours", "solve_ivp script", "MuJoCo, RK4 1 ms", "bound"
 
@@ -110,11 +111,12 @@ def measure(report: Report, options: argparse.Namespace) -> None:
         )
         reference = fine["pose"][:, 3:]
     times = interleave(contestants, options.rounds, warm=0 if options.cold else 1)
-    tell(report, times, results, reference, own_reference)
+    tell(report, setup.until, times, results, reference, own_reference)
 
 
 def tell(
     report: Report,
+    until: float,
     times: dict[str, list[float]],
     results: dict[str, np.ndarray],
     reference: np.ndarray,
@@ -144,8 +146,10 @@ def tell(
         report.figure("bound off ours in the same steps [m]", off, at_most=AGREE)
     off = float(np.abs(results[SCRIPT] - reference).max())
     report.figure(f"{SCRIPT} off ours in steps of 0.5 ms, any frame [m]", off, at_most=AGREE)
-    report.figure("error of ours [mm]", errors[OURS], at_most=MAX_ERROR)
-    report.figure(f"error of the {SCRIPT} [mm]", errors[SCRIPT], at_most=MAX_ERROR)
+    # On the way, before the platform has come to rest at the goal, errors are larger.
+    limit = MAX_ERROR if until >= SETTLED else None
+    report.figure("error of ours [mm]", errors[OURS], at_most=limit)
+    report.figure(f"error of the {SCRIPT} [mm]", errors[SCRIPT], at_most=limit)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -151,11 +151,13 @@ class Report:
 
     Attributes:
         name: of the benchmark.
-        about: what is measured, a paragraph.
+        title: what is measured, a line.
+        about: how, a paragraph.
         command: that makes it.
     """
 
     name: str
+    title: str
     about: str
     command: str
     machine: dict[str, Any] = field(default_factory=machine)
@@ -286,9 +288,9 @@ def run(
     given = list(sys.argv[1:] if arguments is None else arguments)
     chosen = parser.parse_args(given)
     shown = [a for i, a in enumerate(given) if "--folder" not in (a, *given[max(i - 1, 0) : i])]
-    text = " ".join(f"{first} {rest.partition('    python')[0]}".split())
-    report = Report(name=name, about=text, command=" ".join([parser.prog, *shown]))
-    print_wrapped(text)
+    how = " ".join(rest.partition("    python")[0].split())
+    report = Report(name=name, title=first, about=how, command=" ".join([parser.prog, *shown]))
+    print_wrapped(f"{first} {how}")
     measure(report, chosen)
     report.write(chosen.folder)
     return report

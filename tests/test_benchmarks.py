@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import json
+import platform
 import subprocess
 import sys
 from collections.abc import Callable
@@ -91,9 +93,33 @@ def test_a_report_says_what_is_missed(tmp_path: Path, capsys: pytest.CaptureFixt
     assert [row["met"] for row in (*report.ratios, *report.figures)] == [True, False]
 
 
-def test_the_machine_is_described_without_its_name() -> None:
-    import platform
+def test_the_page_says_what_the_reports_say(tmp_path: Path) -> None:
+    def measure(report: harness.Report, _: argparse.Namespace) -> None:
+        spread = harness.Spread(median=12.5, low=11.25, high=13.75)
+        report.table("one, two", [{"Test 4": "ours", "x real time": spread, "error": 1.25e-7}])
+        report.ratio("peer / ours", spread, at_least=20.0)
+        report.skip("nobody is not installed")
 
+    for name in ("peers_loop", "another"):
+        about = "What it is: ours, theirs.\n\nHow it is done.\n\n    python -m this"
+        harness.run(name, about, measure, lambda _: None, ["--folder", str(tmp_path)])
+    spec = importlib.util.spec_from_file_location("page", ROOT / "docs" / "make_performance.py")
+    assert spec is not None and spec.loader is not None
+    maker = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(maker)
+    reports = maker.read(tmp_path)
+    assert list(reports) == ["peers_loop", "another"]
+    text = maker.page(reports)
+    assert "| peers_loop | peer / ours | 12.5 (11.2 to 13.8) | >= 20 | **missed** |" in text
+    assert "## What it is: ours, theirs\n\nHow it is done.\n\n`python -m benchmarks another" in text
+    assert "| ours | 12.5 (11.2 to 13.8) | 1.2e-07 |" in text
+    assert "* left out: nobody is not installed" in text
+    assert f"numpy {harness.machine()['numpy']}" in text.replace("\n", " ")
+    maker.draw(reports, tmp_path / "x.png")
+    assert (tmp_path / "x.png").stat().st_size > 5000
+
+
+def test_the_machine_is_described_without_its_name() -> None:
     described = harness.machine()
     assert described["cores"] >= 1 and described["python"] and described["drake"]
     assert platform.node() not in json.dumps(described).split()
