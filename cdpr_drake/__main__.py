@@ -78,6 +78,10 @@ def dispatch(options: Namespace) -> int:
             from cdpr_drake.commands.reproduce import reproduce_command
 
             return reproduce_command(options)
+        if options.command == "sweep":
+            from cdpr_drake.commands.sweep import sweep_command
+
+            return sweep_command(options)
         from cdpr_drake.commands.run import run_command
 
         return run_command(options)

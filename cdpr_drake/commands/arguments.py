@@ -99,6 +99,9 @@ def _build_parser() -> argparse.ArgumentParser:
     from cdpr_drake.commands.reproduce_arguments import add_reproduce
 
     add_reproduce(commands)
+    from cdpr_drake.commands.sweep_arguments import add_sweep
+
+    add_sweep(commands)
     from cdpr_drake.commands.ablate_arguments import add_ablate
 
     add_ablate(commands)

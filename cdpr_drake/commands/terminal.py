@@ -14,10 +14,11 @@ from typing import Any, TextIO
 
 from cdpr_drake.model.robot import RobotFileWarning
 from cdpr_drake.study.stability import StabilityWarning
+from cdpr_drake.study.step_size import StepWarning
 
 NAME = "cdpr-drake"
 
-OURS = (RobotFileWarning, StabilityWarning)
+OURS = (RobotFileWarning, StabilityWarning, StepWarning)
 """Warnings that are for the user of the command line."""
 
 REDRAW_PERIOD = 0.1
