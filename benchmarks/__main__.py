@@ -20,14 +20,14 @@ QUICK = {
     "catenary": ["--count", "100000"],
     "images": ["--frames", "3", "--repeats", "3"],
     "integrators": ["--until", "4", "--rounds", "1"],
-    "loop": ["--repeats", "1"],
+    "loop": ["--rounds", "1", "--until", "5"],
     "peers_cable": ["--peer-count", "50", "--rounds", "3"],
     "peers_equilibrium": ["--count", "1000", "--poses", "2", "--rounds", "2"],
     "peers_linearize": ["--rounds", "5"],
     "peers_loop": ["--until", "5", "--rounds", "2"],
     "scale": ["--rounds", "3", "--work", "8", "--until", "10"],
     "study": ["--duration", "10", "--robots", "3"],
-    "vision": ["--repeats", "30"],
+    "vision": ["--rounds", "30"],
 }
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")

@@ -1,9 +1,10 @@
-"""Speed of the sampled, noisy vision-based loop of Test 4, with its error beside it.
+"""What the package takes to start, and the loop of Test 4 with and without compiled kernels.
 
-The reference for the error is the same loop, with the same noise, in steps of 0.5 ms. Also times
-the import of the package on top of the pydrake modules it needs.
+The import of pydrake's modules in a fresh interpreter, and of the package on top of them; then the
+sampled, noisy vision-based loop with all signals kept, compiled and not. Each in a process of its
+own, in its CPU time.
 
-    python benchmarks/bench_loop.py [--until 80] [--repeats 3]
+    python -m benchmarks loop [--until 20] [--rounds 3]
 """
 
 from __future__ import annotations
@@ -12,68 +13,73 @@ import argparse
 import os
 import subprocess
 import sys
-import time
-from pathlib import Path
+from collections.abc import Sequence
 
-import numpy as np
-
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
-
-from cdpr_drake.diagrams.simulation import MAX_STEP  # noqa: E402
-from cdpr_drake.experiments.runs import run, setup_of_test  # noqa: E402
-from cdpr_drake.model.kernels import is_compiled  # noqa: E402
-
-REFERENCE_STEP = 0.0005
+from benchmarks.harness import ROOT, Report, Spread, positive, ratio, run
 
 PYDRAKE = (
     "import pydrake.systems.framework, pydrake.multibody.plant, pydrake.systems.primitives, "
     "pydrake.systems.analysis, pydrake.math, pydrake.autodiffutils, pydrake.common.yaml"
 )
+TOLD = "; import time; print(time.process_time())"
+LOOP = """
+import sys, time
+from cdpr_drake.experiments.runs import run, setup_of_test
+setup = setup_of_test(4, gain=0.1, until=float(sys.argv[1]))
+run(setup.replace(until=1.0))
+begun = time.process_time()
+run(setup)
+print((time.process_time() - begun) / setup.until)
+"""
 
 
-def main() -> None:
-    """Print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--until", type=float, default=80.0, help="simulated time [s]")
-    parser.add_argument("--repeats", type=int, default=3, help="timed runs, the median counts")
-    parser.add_argument("--only-speed", action="store_true", help="neither reference nor import")
-    options = parser.parse_args()
-    setup = setup_of_test(4, gain=0.1, until=options.until)
-    run(setup.replace(until=1.0))  # compile
-    kind = "compiled" if is_compiled() else "not compiled"
-    runs = [run(setup) for _ in range(options.repeats)]
-    factors = [r.record.real_time_factor for r in runs]
-    line = (
-        f"{kind}: {np.median(factors):.1f} x real time ({min(factors):.1f} to {max(factors):.1f})"
+def fresh(code: str, *arguments: str, **environment: str) -> float:
+    """Return the time [s] that some code prints in a fresh interpreter."""
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments],
+        check=True, cwd=ROOT, env={**os.environ, **environment}, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    return float(done.stdout)
+
+
+def measure(report: Report, options: argparse.Namespace) -> None:
+    """Fill the report."""
+    base, both, compiled, plain = [], [], [], []
+    for _ in range(options.rounds):
+        base.append(fresh(PYDRAKE + TOLD))
+        both.append(fresh(f"{PYDRAKE}; import cdpr_drake{TOLD}"))
+        until = str(options.until)
+        compiled.append(fresh(LOOP, until))
+        plain.append(fresh(LOOP, until, CDPR_DRAKE_NUMBA="0"))
+    added = [b - a for a, b in zip(base, both, strict=True)]
+    report.table(
+        "imports in a fresh interpreter",
+        [
+            {"import": "pydrake's modules", "s": Spread.of(base)},
+            {"import": "cdpr_drake on top", "s": Spread.of(added)},
+        ],
     )
-    print(f"{line}, RK3 in steps of {MAX_STEP * 1e3:g} ms", flush=True)
-    if options.only_speed:
-        return
-    reference = run(setup.replace(max_step=REFERENCE_STEP))
-    miss = runs[0].record["pose"][-1] - reference.record["pose"][-1]
-    print(
-        f"final pose against steps of {REFERENCE_STEP * 1e3:g} ms: "
-        f"{np.linalg.norm(miss[3:]) * 1e3:.1e} mm, {np.degrees(np.linalg.norm(miss[:3])):.1e} deg",
-        flush=True,
+    report.table(
+        f"loop of Test 4, {options.until:g} s, whole runs",
+        [
+            {"kernels": name, "x real time": Spread.of([1.0 / t for t in times])}
+            for name, times in (("compiled", compiled), ("not compiled", plain))
+        ],
     )
-    if is_compiled():
-        command = [sys.executable, __file__, "--only-speed", "--until", str(options.until)]
-        command += ["--repeats", str(options.repeats)]
-        subprocess.run(command, check=True, env={**os.environ, "CDPR_DRAKE_NUMBA": "0"})
-    base, both = import_time(PYDRAKE), import_time(f"{PYDRAKE}; import cdpr_drake")
-    print(f"import cdpr_drake: {both - base:.2f} s on top of {base:.2f} s of pydrake")
+    report.ratio("not compiled / compiled", ratio(plain, compiled))
 
 
-def import_time(code: str, repeats: int = 5) -> float:
-    """Return the shortest time [s] that a fresh interpreter takes for `code`, of some `repeats`."""
-    times = []
-    for _ in range(repeats):
-        begun = time.perf_counter()
-        subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)
-        times.append(time.perf_counter() - begun)
-    return min(times)
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add this benchmark's options."""
+    parser.add_argument("--until", type=float, default=20.0, help="simulated time [s]")
+    parser.add_argument("--rounds", type=positive, default=3)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure; times are told, not judged."""
+    run("loop", __doc__, measure, add_options, arguments)
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -110,7 +110,8 @@ def measure(report: Report, options: argparse.Namespace) -> None:
             first.loop, first.context, setup.until, record=("pose",), max_step=REFERENCE_STEP
         )
         reference = fine["pose"][:, 3:]
-    times = interleave(contestants, options.rounds, warm=0 if options.cold else 1)
+    # What has to be compiled is by now; a round that does not count would take long.
+    times = interleave(contestants, options.rounds, warm=0)
     tell(report, setup.until, times, results, reference, own_reference)
 
 
@@ -156,7 +157,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Add this benchmark's options."""
     parser.add_argument("--until", type=float, default=80.0, help="simulated time [s]")
     parser.add_argument("--rounds", type=positive, default=3)
-    parser.add_argument("--cold", action="store_true", help="no round before that does not count")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

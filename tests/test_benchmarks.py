@@ -31,7 +31,7 @@ SMALLEST: dict[str, tuple[Any, str]] = {
     "peers_cable": (bench_peers_cable, "--count 600 --peer-count 6 --rounds 1"),
     "peers_equilibrium": (bench_peers_equilibrium, "--count 20 --poses 1 --rounds 1"),
     "peers_linearize": (bench_peers_linearize, "--rounds 1"),
-    "peers_loop": (bench_peers_loop, "--until 0.3 --rounds 1 --cold"),
+    "peers_loop": (bench_peers_loop, "--until 0.3 --rounds 1"),
     "scale": (bench_scale, "--rounds 1 --calls 5 --work 0"),
 }
 
