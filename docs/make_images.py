@@ -2,7 +2,7 @@
 
     python docs/make_images.py
 
-Needs Graphviz (dot) and Chromium besides the package.
+Needs Graphviz (dot), Chromium and EGL besides the package.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from cdpr_drake.model.vision.cable_drawing import CableDrawing
 from cdpr_drake.model.vision.lines import CableLines
 from cdpr_drake.show import (
     block_diagram,
+    camera_view_figure,
     rates_and_responses_figure,
     screenshot_replay,
     stereo_view_figure,
@@ -40,6 +41,9 @@ def make_images() -> None:
     comparison = compare_cable_models(["cogiro", "cogiro-98m"])
     rates_and_responses_figure(comparison).savefig(IMAGES / "rates_and_responses.png", dpi=100)
     stereo_view().savefig(IMAGES / "stereo_view.png", dpi=100)
+    cogiro = load_robot("cogiro")
+    start, _ = paper_test(4).poses(cogiro)
+    camera_view_figure(cogiro, start).savefig(IMAGES / "camera_views.png", dpi=100)
     with tempfile.TemporaryDirectory() as folder:
         output = Path(folder) / "demo"
         if main(["run", "--output", str(output)]):

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from pydrake.geometry import (
-    Box,
     Convex,
     FrameId,
     GeometryFrame,
@@ -31,6 +30,7 @@ from pydrake.geometry import (
 )
 from pydrake.math import RigidTransform
 
+from cdpr_drake.diagrams.hall import WALL, hall_parts
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array
 from cdpr_drake.model.vision.cameras import Pattern
@@ -57,13 +57,6 @@ LIGHTS = (
 )
 """Directions [x, y, z] in W and intensities of four lamps far away."""
 
-_FLOOR, _WALL, _POST, _BAND = (
-    (0.30, 0.31, 0.32),
-    (0.44, 0.47, 0.50),
-    (0.16, 0.27, 0.42),
-    (0.55, 0.45, 0.12),
-)
-
 
 def make_camera_scene(robot: CableRobot) -> tuple[SceneGraph, SourceId, FrameId]:
     """Return a scene to be rendered, the source of its one moving frame, and that frame, P.
@@ -76,11 +69,12 @@ def make_camera_scene(robot: CableRobot) -> tuple[SceneGraph, SourceId, FrameId]
         LightParameter(type="directional", frame="world", direction=light[:3], intensity=light[3])
         for light in LIGHTS
     ]
-    parameters = RenderEngineVtkParams(default_clear_color=np.array(_WALL), lights=lights)
+    parameters = RenderEngineVtkParams(default_clear_color=np.array(WALL), lights=lights)
     scene.AddRenderer(RENDERER, MakeRenderEngineVtk(parameters))
     source = scene.RegisterSource("pose_cameras")
     frame = scene.RegisterFrame(source, GeometryFrame("platform"))
-    _add_hall(scene, source, robot.drawing_points)
+    for name, shape, X_WS, colour in hall_parts(robot.drawing_points):
+        _add(scene, source, name, shape, X_WS, _look(Rgba(*colour)))
     _add_platform(scene, source, frame, robot)
     return scene, source, frame
 
@@ -135,32 +129,6 @@ def _picture(pattern: Pattern) -> Any:
     radius = np.min([np.hypot(x - a, y[:, None] - b) for a, b in pattern.points], axis=0) / d
     t = np.clip((radius - 0.5) / SOFT_EDGE + 0.5, 0.0, 1.0)
     return np.round(DARK + (WHITE - DARK) * (1.0 - t * t * (3.0 - 2.0 * t))).astype(np.uint8)
-
-
-def _add_hall(scene: SceneGraph, source: SourceId, drawing_points: Array) -> None:
-    """Add floor, walls, and a post below each drawing point that stands apart."""
-    size = np.ptp(drawing_points, axis=0)
-    middle = drawing_points.mean(axis=0)
-    top = float(drawing_points[:, 2].max())
-    width, depth = 1.5 * size[0] + 4.0, 1.5 * size[1] + 4.0
-    height = 1.6 * top
-    x, y = middle[:2]
-    for name, shape, place, colour in (
-        ("floor", Box(width, depth, 0.1), (x, y, -0.1), _FLOOR),
-        ("wall_x0", Box(0.1, depth, height), (x - 0.5 * width, y, 0.5 * height), _WALL),
-        ("wall_x1", Box(0.1, depth, height), (x + 0.5 * width, y, 0.5 * height), _WALL),
-        ("wall_y0", Box(width, 0.1, height), (x, y - 0.5 * depth, 0.5 * height), _WALL),
-        ("wall_y1", Box(width, 0.1, height), (x, y + 0.5 * depth, 0.5 * height), _WALL),
-    ):
-        _add(scene, source, name, shape, RigidTransform(place), _look(Rgba(*colour)))
-    side = 0.02 * top + 0.2
-    outwards = drawing_points - middle
-    outwards[:, 2] = 0.0
-    outwards /= np.linalg.norm(outwards, axis=1, keepdims=True)
-    for i, (p, out) in enumerate(zip(drawing_points, outwards, strict=True)):
-        foot = p + (side + 0.1) * out
-        X = RigidTransform([foot[0], foot[1], 0.5 * p[2]])
-        _add(scene, source, f"post_{i}", Box(side, side, p[2]), X, _look(Rgba(*_POST)))
 
 
 def _look(colour: Rgba | None = None) -> PerceptionProperties:

@@ -2,6 +2,7 @@
 
 from cdpr_drake.show.block_diagram import GraphvizError, block_diagram, block_diagram_dot
 from cdpr_drake.show.calibration_plots import calibration_figure
+from cdpr_drake.show.camera_views import camera_view_figure
 from cdpr_drake.show.mode_plots import mode_shape_figure, pole_figure, stability_figure
 from cdpr_drake.show.plots import (
     cable_sag,
@@ -27,6 +28,7 @@ __all__ = [
     "cable_sag",
     "calibration_figure",
     "calibration_study_figure",
+    "camera_view_figure",
     "error_norm_figure",
     "gain_map_figure",
     "mode_shape_figure",
