@@ -128,8 +128,8 @@ def fit(explanation: Explanation) -> tuple[Array, Array]:
 def predictions(explanation: Explanation) -> dict[str, Array]:
     """Return what a fit to one printed number alone predicts for the other, all fits considered.
 
-    The modulus is solved for at values of the last free field across its range, the others at
-    their least.
+    The modulus is solved for at values of the last free field across its range, and that field at
+    either end of the modulus' range; other fields are at their least.
 
     Args:
         explanation: what to fit.
@@ -139,34 +139,43 @@ def predictions(explanation: Explanation) -> dict[str, Array]:
         the largest in Tests 1 and 2 [mm]; n = m = 0 where no value in range fits.
     """
     found: dict[str, list[float]] = {"largest": [], "z": []}
-    for others in _grid(explanation):
-        for which, name in enumerate(("largest", "z")):
-            values = _solved(explanation, others, which)
-            if values is not None:
-                errors = ends(explanation.structure(values))
-                z, largest = errors[3].position[2], largest_of_tests_1_and_2(errors)
-                found[name].append(float(z if name == "z" else largest))
+    for which, name in enumerate(found):
+        for values in _fits_to_one(explanation, which):
+            errors = ends(explanation.structure(values))
+            z, largest = errors[3].position[2], largest_of_tests_1_and_2(errors)
+            found[name].append(float(z if name == "z" else largest))
     return {name: np.array(values) for name, values in found.items()}
 
 
-def _grid(explanation: Explanation) -> Iterator[Array]:
-    """Yield the values of the free fields after the modulus."""
+def _fits_to_one(explanation: Explanation, which: int) -> Iterator[Array]:
+    """Yield values of the free fields that meet one datum."""
     low, high = explanation.bounds()
     if low.size == 1:
-        yield np.zeros(0)
+        yield from _solved(explanation, low, 0, 2, which)
         return
     for last in np.linspace(low[-1], high[-1], GRID):
-        yield np.append(low[1:-1], last)
+        yield from _solved(explanation, np.append(low[:-1], last), 0, 2, which)
+    for modulus in (low[0], high[0]):
+        start = np.append(modulus, low[1:])
+        yield from _solved(explanation, start, low.size - 1, GRID, which)
 
 
-def _solved(explanation: Explanation, others: Array, which: int) -> Array | None:
-    """Return the free fields with the modulus that meets one datum, None if none in range does."""
+def _solved(
+    explanation: Explanation, values: Array, free: int, count: int, which: int
+) -> Iterator[Array]:
+    """Yield values with one field solved for, wherever in its range the sign changes."""
     from scipy.optimize import brentq
 
-    def miss(modulus: float) -> float:
-        return float(data(ends(explanation.structure(np.append(modulus, others))))[which])
+    def at(value: float) -> Array:
+        return np.concatenate([values[:free], [value], values[free + 1 :]])
 
-    low, high = (float(bound[0]) for bound in explanation.bounds())
-    if miss(low) * miss(high) > 0.0:
-        return None
-    return np.append(brentq(miss, low, high, xtol=0.1), others)
+    def miss(value: float) -> float:
+        return float(data(ends(explanation.structure(at(value))))[which])
+
+    low, high = (float(bound[free]) for bound in explanation.bounds())
+    points = np.linspace(low, high, count).tolist()
+    misses = [miss(point) for point in points]
+    for i in range(count - 1):
+        if misses[i] * misses[i + 1] < 0.0:
+            tolerance = 1e-3 * (high - low)
+            yield at(brentq(miss, points[i], points[i + 1], xtol=tolerance))
