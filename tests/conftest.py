@@ -6,7 +6,6 @@ import importlib.util
 import os
 import shutil
 import subprocess
-import sys
 from collections.abc import Callable
 from functools import cache
 from importlib.metadata import version
@@ -14,6 +13,7 @@ from importlib.metadata import version
 import hypothesis
 import pytest
 
+from cdpr_drake.diagrams.rendering import rendering_available
 from cdpr_drake.model.robot import CableRobot, load_robot
 
 os.environ.setdefault("MPLBACKEND", "Agg")  # figures open no window
@@ -21,19 +21,6 @@ os.environ.setdefault("MPLBACKEND", "Agg")  # figures open no window
 # No deadline: a test must not fail because the machine is busy or numba compiles.
 hypothesis.settings.register_profile("cdpr_drake", hypothesis.settings.default, deadline=None)
 hypothesis.settings.load_profile("cdpr_drake")
-
-# RenderEngineVtk ends the process with a segmentation fault where EGL finds no driver.
-RENDER_ONE_IMAGE = """
-from pydrake.geometry import (
-    ClippingRange, ColorRenderCamera, MakeRenderEngineVtk, RenderCameraCore, RenderEngineVtkParams
-)
-from pydrake.math import RigidTransform
-from pydrake.systems.sensors import CameraInfo, ImageRgba8U
-camera = CameraInfo(width=8, height=8, fov_y=1.0)
-core = RenderCameraCore("probe", camera, ClippingRange(0.1, 10.0), RigidTransform())
-engine = MakeRenderEngineVtk(RenderEngineVtkParams())
-engine.RenderColorImage(ColorRenderCamera(core), ImageRgba8U(8, 8))
-"""
 
 
 def _runs(*command: str) -> bool:
@@ -65,12 +52,6 @@ def has_chromium() -> bool:
 
 
 @cache
-def has_egl() -> bool:
-    """Whether Drake can render an image without a display, tried in another process."""
-    return _runs(sys.executable, "-c", RENDER_ONE_IMAGE)
-
-
-@cache
 def has_graphviz() -> bool:
     """Whether graphviz' `dot` runs."""
     return _runs("dot", "-V")
@@ -92,7 +73,7 @@ def has_distributed() -> bool:
 NEEDS: dict[str, tuple[Callable[[], bool], str]] = {
     "numba": (has_numba, "numba is not installed (the `fast` extra)"),
     "chromium": (has_chromium, "no Chromium or Chrome that starts"),
-    "egl": (has_egl, "no EGL driver, so Drake cannot render without a display"),
+    "egl": (rendering_available, "no EGL driver, so Drake cannot render without a display"),
     "graphviz": (has_graphviz, "graphviz' `dot` is not installed"),
     "distributed": (has_distributed, "distributed is not installed (the `cluster` extra)"),
     "jupyter": (has_jupyter, "nbclient or ipykernel is not installed (the `notebook` extra)"),

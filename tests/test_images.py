@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from ray_caster import cast_images
 from samples import rotation
 from system_checks import documented_ports, feedthrough, output_sizes
 
+from cdpr_drake.__main__ import main
 from cdpr_drake.diagrams import make_vision_based_control, rendering, rest_context, simulate
 from cdpr_drake.errors import GeometryError, RenderingError, RobotFileError, SimulationError
 from cdpr_drake.experiments.paper_tests import paper_test
@@ -362,12 +364,15 @@ def test_a_lens_that_no_pinhole_can_stand_for_is_refused(cogiro: CableRobot) -> 
 
 
 def test_without_a_driver_the_error_is_one_line(
-    cogiro: CableRobot, monkeypatch: pytest.MonkeyPatch
+    cogiro: CableRobot, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: Any
 ) -> None:
     monkeypatch.setattr(rendering, "rendering_available", lambda: False)
     with pytest.raises(RenderingError, match="EGL") as caught:
         make_vision_based_control(cogiro, sensors="images")
     assert "\n" not in str(caught.value)
+    assert main(["run", "--sensors", "images", "--output", str(tmp_path / "out")]) == 2
+    message = capsys.readouterr().err.strip()
+    assert "EGL" in message and "\n" not in message and not (tmp_path / "out").exists()
     with pytest.raises(ValueError, match="give a sample time"):
         make_vision_based_control(cogiro, sensors="images", sample_time=None)
 

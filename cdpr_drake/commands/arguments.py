@@ -163,7 +163,8 @@ def _add_run(commands: argparse._SubParsersAction[_Parser]) -> None:
     how.add_argument(
         "--sensors", default="gaussian", metavar="KIND",
         help="what VBC's cameras deliver: gaussian, the truth with noise; targets, a pose from the "
-        "patterns' points and tangents from the cables' edges (default: gaussian)",
+        "patterns' points and tangents from the cables' edges; images, the same detected in "
+        "rendered images, which is slow (default: gaussian)",
     )  # fmt: skip
     how.add_argument(
         "--estimator", default="joint", metavar="KIND",
