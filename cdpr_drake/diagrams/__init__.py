@@ -5,6 +5,7 @@ from cdpr_drake.diagrams.control import (
     make_vision_based_control,
     with_reference,
 )
+from cdpr_drake.diagrams.rendering import make_pose_camera_images, rendering_available
 from cdpr_drake.diagrams.rest import leaf_systems, rest_context, robot_of, set_at_rest
 from cdpr_drake.diagrams.robot import make_cable_robot, make_platform, platform_pose
 from cdpr_drake.diagrams.simulation import Record, make_simulator, simulate
@@ -15,9 +16,11 @@ __all__ = [
     "make_cable_robot",
     "make_joint_space_control",
     "make_platform",
+    "make_pose_camera_images",
     "make_simulator",
     "make_vision_based_control",
     "platform_pose",
+    "rendering_available",
     "rest_context",
     "robot_of",
     "set_at_rest",
