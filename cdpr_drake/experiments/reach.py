@@ -40,8 +40,8 @@ def check_pose(robot: CableRobot, X_WP: RigidTransform, name: str) -> None:
     matrix = wrench_matrix(geometry)
     check_rank(matrix)
     high = robot.cable.max_tension
-    try:
-        bounded_distribution(matrix, weight_wrench(robot, geometry), 0.0, high, 0.5 * high)
+    try:  # any tensions will do; those of least norm are found first
+        bounded_distribution(matrix, weight_wrench(robot, geometry), 0.0, high, 0.0)
     except TensionError as error:
         x, y, z = X_WP.translation()
         raise TensionError(

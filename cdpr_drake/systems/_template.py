@@ -6,6 +6,7 @@ import inspect
 import math
 import sys
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -37,11 +38,21 @@ def system_template(name: str) -> Callable[[Callable[[type], type]], Any]:
 
         scope = sys.modules[instantiate.__module__]
         template = TemplateSystem.define(f"{name}_", (float, AutoDiffXd), scope=scope)(build)
-        plain = template[float]  # which Drake names by its template and scalar
+        plain = _on_a_short_stack(lambda: template[float])
+        # Drake has named it by its template and scalar.
         plain.__name__ = plain.__qualname__ = name
         return template
 
     return decorate
+
+
+def _on_a_short_stack(make: Callable[[], type]) -> type:
+    """Return what `make` returns, called on another thread.
+
+    Drake asks for the source of every frame below a new class, twice: 0.1 s each amid imports.
+    """
+    with ThreadPoolExecutor(1) as thread:
+        return thread.submit(make).result()
 
 
 def value(array: np.ndarray) -> np.ndarray:
