@@ -17,7 +17,7 @@ from pathlib import Path
 FOLDER = Path(__file__).resolve().parent
 
 QUICK = {
-    "catenary": ["--count", "100000"],
+    "catenary": ["--count", "100000", "--rounds", "2"],
     "images": ["--frames", "3", "--repeats", "3"],
     "integrators": ["--until", "4", "--rounds", "1"],
     "loop": ["--rounds", "1", "--until", "5"],

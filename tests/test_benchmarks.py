@@ -17,42 +17,52 @@ import pytest
 sys.path.append(str(Path(__file__).resolve().parents[1]))  # behind what is installed
 
 from benchmarks import (
+    bench_catenary,
+    bench_integrators,
     bench_peers_cable,
     bench_peers_equilibrium,
     bench_peers_linearize,
     bench_peers_loop,
     bench_scale,
+    bench_study,
+    bench_vision,
     harness,
 )
 
 ROOT = Path(__file__).resolve().parents[1]
 
 SMALLEST: dict[str, tuple[Any, str]] = {
+    "catenary": (bench_catenary, "--count 140 --rounds 1"),
+    "integrators": (bench_integrators, "--until 0.1 --rounds 1"),
     "peers_cable": (bench_peers_cable, "--count 600 --peer-count 6 --rounds 1"),
     "peers_equilibrium": (bench_peers_equilibrium, "--count 20 --poses 1 --rounds 1"),
     "peers_linearize": (bench_peers_linearize, "--rounds 1"),
     "peers_loop": (bench_peers_loop, "--until 0.3 --rounds 1"),
     "scale": (bench_scale, "--rounds 1 --calls 5 --work 0"),
+    "study": (bench_study, "--only theory --robots 1"),
+    "vision": (bench_vision, "--rounds 1"),
 }
 
 
-@pytest.mark.parametrize("peers", ["with peers", "without"])
-@pytest.mark.parametrize("name", SMALLEST)
+WITH = [(name, True) for name in SMALLEST]
+WITHOUT = [(name, False) for name in ("peers_cable", "peers_equilibrium", "peers_loop")]
+
+
+@pytest.mark.parametrize(("name", "with_peers"), WITH + WITHOUT)
 def test_a_benchmark_runs(
-    name: str, peers: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    name: str, with_peers: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     module, options = SMALLEST[name]
-    if peers == "without":
-        if name in ("peers_linearize", "scale"):
-            pytest.skip("has no peers that could be missing")
+    if not with_peers:
         monkeypatch.setattr(harness, "is_installed", lambda package: False)
     assert module.main([*options.split(), "--folder", str(tmp_path)]) == 0
     written = json.loads((tmp_path / f"{name}.json").read_text())
     assert written["command"] == f"python -m benchmarks {name} {options}"
-    assert written["tables"] and all(table["rows"] for table in written["tables"])
+    assert (written["tables"] or written["figures"]) and all(
+        table["rows"] for table in written["tables"]
+    )
     assert all(row["low"] <= row["median"] <= row["high"] for row in written["ratios"])
-    assert all(row.get("met", True) for row in written["figures"])
-    assert peers != "without" or any("not installed" in why for why in written["skipped"])
+    assert with_peers or any("not installed" in why for why in written["skipped"])
 
 
 def test_contestants_take_turns() -> None:
@@ -91,6 +101,16 @@ def test_a_report_says_what_is_missed(tmp_path: Path, capsys: pytest.CaptureFixt
     assert "a / b: 3 (1 to 4), wanted >= 2: met" in printed
     assert "error: 2.0e-09 m, wanted <= 1.0e-09: MISSED" in printed
     assert [row["met"] for row in (*report.ratios, *report.figures)] == [True, False]
+    assert not report.is_right()
+
+
+def test_times_do_not_make_a_report_wrong(tmp_path: Path) -> None:
+    def measure(report: harness.Report, _: argparse.Namespace) -> None:
+        report.ratio("a / b", harness.Spread(median=1.0, low=1.0, high=4.0), at_least=2.0)
+        report.figure("a frame", 4.0, "ms", at_most=3.0)
+
+    report = harness.run("x", "Title.", measure, lambda _: None, ["--folder", str(tmp_path)])
+    assert report.is_right()
 
 
 def test_the_page_says_what_the_reports_say(tmp_path: Path) -> None:
