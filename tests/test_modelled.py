@@ -107,12 +107,14 @@ def test_what_cannot_be_modelled_is_refused(cogiro: CableRobot, modelled: tuple[
         make_vision_based_control(cogiro, modelled=modelled)
 
 
+@pytest.mark.needs("numba")
 def test_test_4_arrives_without_load_cells_and_tangent_cameras() -> None:
     summary = run(setup_of_test(4, gain=0.5, until=14.0, noise=False, modelled=BOTH)).summary
     assert summary.position_error < 3.0 and summary.orientation_error < 0.05
     assert not summary.slack_cables
 
 
+@pytest.mark.needs("numba")
 def test_a_continuous_loop_takes_the_model_too() -> None:
     setup = setup_of_test(4, gain=0.4, until=0.5, noise=False, sample_time=None)
     with_model, with_sensors = run(setup.replace(modelled=BOTH)), run(setup)
