@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Any
 
@@ -92,6 +93,7 @@ class Lens:
             cv2.addWeighted(out, 1.0, grey, 1.0, -_ZERO, dst=out)
 
 
+@functools.lru_cache(maxsize=4)  # cameras are often alike
 def _rays(intrinsics: Intrinsics) -> Array | None:
     """Return (height, width, 2): where each pixel's ray meets the plane z = 1.
 
