@@ -15,14 +15,16 @@ from matplotlib.figure import Figure
 
 from cdpr_drake.__main__ import main
 from cdpr_drake.diagrams import make_vision_based_control
+from cdpr_drake.experiments.calibration_study import GROUPS, calibration_effect
 from cdpr_drake.experiments.paper_tests import paper_test
 from cdpr_drake.model.catenary import elastic_catenary
 from cdpr_drake.model.equilibrium import rest_state
-from cdpr_drake.model.robot import load_robot
+from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.vision.cable_drawing import CableDrawing
 from cdpr_drake.model.vision.lines import CableLines
 from cdpr_drake.show import (
     block_diagram,
+    calibration_study_figure,
     camera_view_figure,
     rates_and_responses_figure,
     screenshot_replay,
@@ -44,6 +46,7 @@ def make_images() -> None:
     cogiro = load_robot("cogiro")
     start, _ = paper_test(4).poses(cogiro)
     camera_view_figure(cogiro, start).savefig(IMAGES / "camera_views.png", dpi=100)
+    calibration_study(cogiro).savefig(IMAGES / "calibration_study.png", dpi=100)
     with tempfile.TemporaryDirectory() as folder:
         output = Path(folder) / "demo"
         if main(["run", "--output", str(output)]):
@@ -51,6 +54,13 @@ def make_images() -> None:
         for name in FIGURES:
             shutil.copy(output / name, IMAGES / name)
         screenshot_replay(output / "replay.html", IMAGES / "replay.png", at_time=8.0)
+
+
+def calibration_study(robot: CableRobot) -> Figure:
+    """Return what 40 random calibrations of each kind and size do to Test 4."""
+    cases = [(group, 1.0) for group in GROUPS] + [("all", 3.0), ("all", 10.0), ("all", 30.0)]
+    move = (robot, *paper_test(4).poses(robot))
+    return calibration_study_figure([calibration_effect(*move, *c, range(40)) for c in cases])
 
 
 def stereo_view() -> Figure:
