@@ -11,11 +11,12 @@ from system_checks import documented_ports, feedthrough, input_sizes, output_siz
 from cdpr_drake.diagrams import leaf_systems, make_vision_based_control, rest_context, simulate
 from cdpr_drake.errors import SimulationError
 from cdpr_drake.experiments import run, setup_of_test
+from cdpr_drake.experiments.modelled_gain import modelled_gain_matrix
 from cdpr_drake.model.equilibrium import rest_state
 from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.modelled import modelled_tangents, modelled_tensions
 from cdpr_drake.model.robot import CableRobot, load_robot
-from cdpr_drake.study import comparable_pose
+from cdpr_drake.study import comparable_pose, gain_matrix
 from cdpr_drake.study.platform import rest_model
 from cdpr_drake.systems import ModelledTangents, ModelledTension
 
@@ -120,3 +121,37 @@ def test_a_continuous_loop_takes_the_model_too() -> None:
     with_model, with_sensors = run(setup.replace(modelled=BOTH)), run(setup)
     apart = with_model.record["pose"] - with_sensors.record["pose"]
     assert 0.0 < np.abs(apart).max() < 1e-4
+
+
+# --- what it does to the gain matrix
+
+
+def coupling(gamma: np.ndarray) -> float:
+    """Return the largest entry off the diagonal."""
+    return float(np.abs(gamma - np.diag(np.diag(gamma))).max())
+
+
+@pytest.mark.parametrize("cable_model", ["SCMWE", "SLSM"])
+def test_with_all_sensors_the_gain_matrix_is_the_study_s(
+    cogiro: CableRobot, cable_model: str
+) -> None:
+    robot, pose = cogiro.with_payload(50.0), comparable_pose(cogiro)
+    gamma = modelled_gain_matrix(robot, cogiro, pose, cable_model=cable_model)
+    expected = gain_matrix(robot, cogiro, pose, cable_model).matrix
+    np.testing.assert_allclose(gamma, expected, atol=1e-12)
+    straight = modelled_gain_matrix(robot, cogiro, pose, BOTH, "SLSM")  # which asks no sensor
+    expected = gain_matrix(robot, cogiro, pose, "SLSM").matrix
+    np.testing.assert_allclose(straight, expected, atol=1e-12)
+
+
+def test_load_cells_are_worth_what_the_mass_is_unknown() -> None:
+    """On the 98 m robot, away from the middle, where cables sag by degrees."""
+    robot = load_robot("cogiro-98m")
+    pose = comparable_pose(robot)
+    known = [modelled_gain_matrix(robot, robot, pose, m) for m in ((), BOTH)]
+    assert np.abs(known[1] - known[0]).max() < 2e-3
+    loaded = robot.with_payload(100.0)
+    seen, guessed = (modelled_gain_matrix(loaded, robot, pose, m) for m in ((), ("tensions",)))
+    assert coupling(guessed) > 3.0 * coupling(seen)
+    without_pairs = modelled_gain_matrix(loaded, robot, pose, ("tangents",))
+    assert np.abs(without_pairs - seen).max() < 2e-3
