@@ -146,7 +146,7 @@ def forward_kinematics(
     robot: CableRobot,
     length: ArrayLike,
     guess: RigidTransform | ArrayLike,
-    max_iterations: int = 200,
+    max_iterations: int = 1000,
 ) -> RestState:
     """Return the equilibrium pose of the platform hanging on cables of given unstrained lengths.
 

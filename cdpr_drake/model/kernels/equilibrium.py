@@ -6,7 +6,7 @@ breaking load (N); runs (m)]; body (4,) = [mass g (N), x_G, y_G, z_G (m)]. Writt
 jacobian (k, 14, 8) as in `catenary.cable_forces_jacobian`; wrench (6,) [torque; force] on the
 platform at its origin, in W; stiffness (6, 6), its change with a motion [rotation; translation] in
 W; turn (3, 3), scratch. rotation (3,) [rad]: a rotation vector; step (6,): a motion; tolerance: of
-the wrench over the weight [-]; max_iterations: steps at most.
+the wrench over the weight [-]; max_iterations: evaluations of the balance at most.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from cdpr_drake.model.kernels.catenary import cable_forces_jacobian
 
 MAX_ROTATION = 0.3  # of one step [rad]
 MAX_TRANSLATION = 1.0  # of one step [m]
+MAX_TRIES = 30  # of lengths along one step
 LEAST_STEP = 1e-14  # below it what is left is round-off of stiff cables
 
 
@@ -122,8 +123,19 @@ def rotated(R, rotation, turn):
         c * y * z + s * x,
         1.0 - c * (x * x + y * y),
     )
-    new = turn @ R
-    return 1.5 * new - 0.5 * (new @ (new.T @ new))
+    new = np.zeros((3, 3))
+    for a in range(3):
+        for b in range(3):
+            new[a, b] = turn[a, 0] * R[0, b] + turn[a, 1] * R[1, b] + turn[a, 2] * R[2, b]
+    for a in range(3):
+        for b in range(3):
+            turn[a, b] = new[0, a] * new[0, b] + new[1, a] * new[1, b] + new[2, a] * new[2, b]
+    out = np.zeros((3, 3))
+    for a in range(3):
+        for b in range(3):
+            product = new[a, 0] * turn[0, b] + new[a, 1] * turn[1, b] + new[a, 2] * turn[2, b]
+            out[a, b] = 1.5 * new[a, b] - 0.5 * product
+    return out
 
 
 @jit
@@ -150,34 +162,35 @@ def find_equilibrium(
     Each step goes as long as the energy falls along it. Return (status of the cables, residual):
     the largest part of the wrench over the weight (torques per metre).
     """
-    stiffness = np.zeros((6, 6))
     new_wrench = np.zeros(6)
-    new_stiffness = np.zeros((6, 6))
+    stiffness = np.zeros((6, 6))
     turn = np.zeros((3, 3))
+    step = np.zeros(6)
     weight = float(body[0])
-    status = balance(R, p, length, points, constants, body, out, jacobian, wrench, stiffness)
-    for _ in range(max_iterations):
-        if status or np.abs(wrench).max() <= tolerance * weight:
+    status, tries, fraction, descent = 0, 0, 0.0, 0.0
+    new_R, new_p = R, p
+    # One call of `balance`, for the start and all that is tried: it is long to compile.
+    for evaluation in range(max_iterations):
+        status = balance(
+            new_R, new_p, length, points, constants, body, out, jacobian, new_wrench, stiffness
+        )
+        if status:
             break
-        step = descent_step(wrench, stiffness)
-        fraction, descent = 1.0, step @ wrench
-        new_R, new_p = R, p
-        for _ in range(30):
-            new_R = rotated(R, fraction * step[:3], turn)
-            new_p = p + fraction * step[3:]
-            status = balance(
-                new_R, new_p, length, points, constants, body, out, jacobian, new_wrench,
-                new_stiffness,
-            )  # fmt: skip
-            ahead = step @ new_wrench
-            if status or abs(ahead) <= 0.5 * descent or ahead > 0.0:
-                break
+        ahead = step @ new_wrench
+        if tries < MAX_TRIES and ahead <= 0.0 and ahead < -0.5 * descent:
             # Beyond the lowest point along the step: go back by the secant of the slope.
             fraction *= max(0.1, descent / (descent - ahead))
-        if fraction * math.sqrt(step @ step) < LEAST_STEP:
-            break
-        R[:] = new_R
-        p[:] = new_p
-        wrench[:] = new_wrench
-        stiffness[:] = new_stiffness
+            tries += 1
+        else:
+            if evaluation > 0 and fraction * math.sqrt(step @ step) < LEAST_STEP:
+                break
+            R[:] = new_R
+            p[:] = new_p
+            wrench[:] = new_wrench
+            if np.abs(wrench).max() <= tolerance * weight:
+                break
+            step = descent_step(wrench, stiffness)
+            fraction, descent, tries = 1.0, step @ wrench, 0
+        new_R = rotated(R, fraction * step[:3], turn)
+        new_p = p + fraction * step[3:]
     return status, np.abs(wrench).max() / weight
