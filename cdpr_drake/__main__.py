@@ -66,6 +66,10 @@ def dispatch(options: Namespace) -> int:
             from cdpr_drake.commands.coupling import coupling_command
 
             return coupling_command(options)
+        if options.command == "explore":
+            from cdpr_drake.commands.explore import explore_command
+
+            return explore_command(options)
         if options.command == "ablate":
             from cdpr_drake.commands.ablate import ablate_command
 

@@ -13,7 +13,7 @@ FEWEST, MOST = 2, 400
 
 
 def add_study_commands(commands: Any) -> None:
-    """Add linearize, stability and coupling to the command line.
+    """Add linearize, stability, coupling and explore to the command line.
 
     Args:
         commands: the subparsers.
@@ -79,6 +79,33 @@ def add_study_commands(commands: Any) -> None:
     how.add_argument("--gain", type=float, default=0.1, metavar="PER_S",
                      help="lambda of the figure [1/s] (default: 0.1)")  # fmt: skip
     _add_output(coupling)
+    _add_explore(commands)
+
+
+def _add_explore(commands: Any) -> None:
+    explore = _add(
+        commands,
+        "explore",
+        "drag the pose and the payload in a browser, and see what changes",
+        "Show a robot at rest in a browser, with sliders for pose, payload and gain: its sagging "
+        "cables with their tensions, the slowest oscillations, and how the control loop converges, "
+        "from the gain matrix. Serves this machine only. Ends by Ctrl-C, by Stop in the browser, "
+        "or when no browser is there.",
+        "cdpr-drake explore --robot cogiro --payload 100",
+    )
+    _add_place(explore, "--robot")
+    how = explore.add_argument_group("how it is controlled")
+    how.add_argument("--cable-model", default="SCMWE", metavar="MODEL", type=str.upper,
+                     help="of the law: ECM, CMWE, SCMWE, SLSM (default: SCMWE)")  # fmt: skip
+    how.add_argument("--gain", type=float, default=0.1, metavar="PER_S",
+                     help="lambda to begin with [1/s] (default: 0.1)")  # fmt: skip
+    page = explore.add_argument_group("the page")
+    page.add_argument("--port", type=int, default=0, metavar="N",
+                      help="of the page, 1024 to 65534; Meshcat takes the next one "
+                      "(default: any two that are free)")  # fmt: skip
+    page.add_argument("--idle", type=float, default=60.0, metavar="S",
+                      help="time without a browser after which to end; 0: never "
+                      "(default: 60)")  # fmt: skip
 
 
 def _add(commands: Any, name: str, title: str, description: str, example: str) -> Any:

@@ -14,11 +14,18 @@ from pydrake.geometry import Cylinder, Meshcat, MeshcatAnimation, MeshcatParams,
 from pydrake.math import RigidTransform
 
 from cdpr_drake.diagrams import Record
-from cdpr_drake.model.catenary import cable_shape, elastic_catenary
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, vector_to_pose
 from cdpr_drake.model.servo import pose_error
 from cdpr_drake.show import scene
+from cdpr_drake.show.cables import (
+    CABLE_RADIUS,
+    SEGMENTS,
+    cable_shapes,
+    css,
+    linear,
+    tension_colours,
+)
 from cdpr_drake.show.overlay import Legend, add_legend
 
 Colour = tuple[float, float, float]
@@ -26,11 +33,8 @@ Colour = tuple[float, float, float]
 LONGEST_PLAYBACK = 20.0
 """Longer runs are shown faster, in whole multiples, to last no longer than this [s]."""
 
-SEGMENTS = 8
-"""Straight bars that stand for a cable; the sag of one is 1/64 of the cable's."""
-
-PATH_RADIUS, CABLE_RADIUS = 0.012, 0.025
-"""Of a robot of CoGiRo's size [m]; a cable's own 2 mm could not be seen."""
+PATH_RADIUS = 0.012
+"""Of a robot of CoGiRo's size [m]."""
 
 COLOUR_PERIOD = 5
 """Frames between two recorded colours; the player interpolates."""
@@ -81,7 +85,7 @@ def write_replay(
     animation.set_repetitions(10_000)
     scene.draw_surroundings(meshcat, robot)
     entries = _add_run(meshcat, animation, robot, record, index)
-    _animate_colours(animation, _colours(tension, limits))
+    _animate_colours(animation, tension_colours(tension, limits))
     if goal is not None:
         scene.draw_platform(meshcat, "/goal", robot, scene.GOAL, ghost=True)
         meshcat.SetTransform("/goal", as_pose(goal))
@@ -100,9 +104,9 @@ def write_replay(
         speed=pace,
         tension=tension,
         tension_range=limits,
-        colours=[_css(c) for c in _colours(np.linspace(*limits, 17), limits)],
+        colours=[css(c) for c in tension_colours(np.linspace(*limits, 17), limits)],
         errors=None if goal is None else _errors(robot, record["pose"][index], goal),
-        entries=[(label, _css(colour)) for label, colour in entries],
+        entries=[(label, css(colour)) for label, colour in entries],
     )
     file = Path(path)
     file.write_text(add_legend(meshcat.StaticHtml(), legend), encoding="utf-8")
@@ -147,40 +151,6 @@ def nearest(time: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """
     right = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
     return right - (wanted - time[right - 1] < time[right] - wanted)
-
-
-def cable_shapes(
-    robot: CableRobot, poses: np.ndarray, lengths: np.ndarray, points: int = SEGMENTS + 1
-) -> np.ndarray:
-    """Return points (n, k, points, 3) [m] in W along the cables of n states, hanging at rest.
-
-    Args:
-        robot: the robot.
-        poses: (n, 6) [roll, pitch, yaw, x, y, z] (rad, m).
-        lengths: (n, k) [m] unstrained, drum run included.
-        points: number of points on each cable.
-
-    Raises:
-        CableError: a length does not exceed the run from the drum.
-    """
-    w, cable = robot.weight_per_metre, robot.cable
-    shapes = np.empty((len(poses), robot.num_cables, points, 3))
-    for shape, pose, length in zip(shapes, poses, lengths, strict=True):
-        p_WB = (vector_to_pose(pose) @ robot.attachment_points.T).T
-        state = elastic_catenary(
-            p_WB - robot.drawing_points, length, w, cable.stiffness, cable.drum_run
-        )
-        shape[:] = cable_shape(
-            robot.drawing_points,
-            p_WB,
-            state.horizontal_tension,
-            -state.force_on_platform[:, 2],
-            state.unstrained_span_length,
-            w,
-            cable.stiffness(state.tension_at_drawing_point),
-            points,
-        )
-    return shapes
 
 
 def _quiet_meshcat() -> Meshcat:
@@ -271,10 +241,9 @@ def _animate_colours(animation: MeshcatAnimation, colours: np.ndarray) -> None:
     Every track must end at the last frame: each loops by itself.
     """
     last = len(colours) - 1
-    # three.js holds colours linear in light, and decodes none that an animation sets.
-    linear = np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
+    values = linear(colours)
     for frame in sorted({*range(0, last, COLOUR_PERIOD), last}):
-        for cable, colour in enumerate(linear[frame]):
+        for cable, colour in enumerate(values[frame]):
             for segment in range(SEGMENTS):
                 path = f"{_segment_path(cable, segment)}/<object>"
                 animation.SetProperty(frame, path, "material.color", colour.tolist())
@@ -298,16 +267,3 @@ def _nice_range(tension: np.ndarray) -> tuple[float, float]:
     return step * math.floor(low / step), step * max(
         math.ceil(high / step), math.floor(low / step) + 1
     )
-
-
-def _colours(tension: np.ndarray, limits: tuple[float, float]) -> np.ndarray:
-    """Return sRGB colours (..., 3) of tensions: dark blue for low, by purple to orange for high."""
-    from matplotlib import colormaps
-
-    low, high = limits
-    part = np.clip((tension - low) / (high - low), 0.0, 1.0)
-    return colormaps["plasma"](0.85 * part)[..., :3]
-
-
-def _css(colour: ArrayLike) -> str:
-    return "#" + "".join(f"{round(255 * float(c)):02x}" for c in np.asarray(colour))

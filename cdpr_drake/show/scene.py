@@ -55,24 +55,28 @@ def draw_surroundings(meshcat: Meshcat, robot: CableRobot) -> None:
     place_viewer(meshcat, robot)
 
 
-def place_viewer(meshcat: Meshcat, robot: CableRobot) -> None:
+def place_viewer(
+    meshcat: Meshcat, robot: CableRobot, distance: float = 1.5, aside: float = 0.13
+) -> None:
     """Look at the whole robot, from the front left and above, with room for a legend on the left.
 
     Args:
         meshcat: whose camera to move.
         robot: the robot.
+        distance: from which, over the robot's size.
+        aside: room for the legend, over the robot's size.
     """
     low, high = robot.drawing_points.min(axis=0), robot.drawing_points.max(axis=0)
     size = float(np.linalg.norm(high - low))
     target = np.array([*(0.5 * (low + high))[:2], 0.42 * high[2]])
     direction = np.array([-0.42, -1.0, 0.40])
     to_the_left = np.cross(direction, [0.0, 0.0, 1.0])
-    target += 0.13 * size * to_the_left / np.linalg.norm(to_the_left)
+    target += aside * size * to_the_left / np.linalg.norm(to_the_left)
     lens = Meshcat.PerspectiveCamera()
     lens.fov = 36.0
     lens.far = 10.0 * size
     meshcat.SetCamera(lens)
-    meshcat.SetCameraPose(target + 1.5 * size * direction / np.linalg.norm(direction), target)
+    meshcat.SetCameraPose(target + distance * size * direction / np.linalg.norm(direction), target)
 
 
 def draw_platform(

@@ -20,7 +20,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.model.equilibrium import rest_state
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.study.names import ERROR, POSE, TWIST
-from cdpr_drake.study.platform import rest_model
+from cdpr_drake.study.platform import RestModel, rest_model
 from cdpr_drake.study.sampled import OnePeriodMap
 from cdpr_drake.study.state_space import Array, StateSpace
 
@@ -222,14 +222,26 @@ def platform_modes(
         GeometryError, TensionError, EquilibriumError: the robot cannot rest there.
         ValueError: winches neither locked nor controlled; an unknown rule.
     """
+    return rest_modes(rest_model(robot, rest_state(robot, pose, tensions)), winches)
+
+
+def rest_modes(model: RestModel, winches: str = "locked") -> Modes:
+    """Return the modes of the platform on its cables about a rest; see `platform_modes`.
+
+    Args:
+        model: the robot's linear model there.
+        winches: "locked" or "controlled".
+
+    Raises:
+        ValueError: winches neither locked nor controlled.
+    """
     if winches not in ("locked", "controlled"):
         raise ValueError(f'winches are "locked" or "controlled", not "{winches}"')
-    model = rest_model(robot, rest_state(robot, pose, tensions))
     names = tuple(f"platform/{part}" for part in ERROR + TWIST)
     if winches == "locked":
         return _modes(model.locked(), names, None)
     groups = ("angle", "rate", "integral")
-    numbers = range(1, robot.num_cables + 1)
+    numbers = range(1, model.robot.num_cables + 1)
     return _modes(
         model.controlled()[0],
         names + tuple(f"winches/{group}[{i}]" for group in groups for i in numbers),

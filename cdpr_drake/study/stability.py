@@ -68,6 +68,7 @@ class SampledServo:
         check_sampling(0.0, sample_time, 0.0)
         ours = believed if believed is not None else robot
         gamma = gain_matrix(robot, ours, pose, cable_model, tensions=tensions, settings=settings)
+        self.gamma = gamma
         self.sample_time = sample_time
         A, B = gamma.rest.controlled()
         n, k = B.shape

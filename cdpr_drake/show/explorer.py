@@ -1,0 +1,205 @@
+"""A robot at rest in a browser, with sliders for pose, payload and gain; see `explore_pose`."""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from pydrake.geometry import Cylinder, Meshcat, MeshcatParams, Rgba
+from pydrake.math import RigidTransform
+
+from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.rotations import as_pose, pose_to_vector
+from cdpr_drake.show import scene
+from cdpr_drake.show.cables import CABLE_RADIUS, SEGMENTS, cable_shapes, linear, tension_colours
+from cdpr_drake.show.explore_page import HOST, PageServer, panel_html
+from cdpr_drake.study.explore import Snapshot, explore_pose
+
+POSE = ("roll [deg]", "pitch [deg]", "yaw [deg]", "x [m]", "y [m]", "z [m]")
+"""Names of the sliders of the pose, in the order of a pose vector."""
+
+PAYLOAD, GAIN, STOP = "payload [kg]", "gain [1/s]", "Stop"
+
+TILT, TURN = 30.0, 90.0
+"""How far roll and pitch, and yaw, can be dragged [deg]."""
+
+PERIOD = 0.02
+"""Time between two looks at the sliders [s]."""
+
+REFUSED = (0.80, 0.15, 0.05)
+"""Colour of the platform where it cannot rest, sRGB."""
+
+
+class Explorer:
+    """Draws a robot where the sliders say and tells what there is to tell of it.
+
+    Args:
+        robot: the robot, with the payload to begin with.
+        pose: X_WP to begin with, or [roll, pitch, yaw, x, y, z] (rad, m).
+        cable_model: of the law.
+        gain: lambda [1/s] to begin with.
+        port: of the page, from 1024 on; Meshcat takes the next one. 0 for any two that are free.
+
+    Raises:
+        ValueError: an unknown cable model, or a gain that is not positive.
+        OSError, RuntimeError: a port is taken.
+    """
+
+    def __init__(
+        self,
+        robot: CableRobot,
+        pose: RigidTransform | ArrayLike,
+        cable_model: str = "SCMWE",
+        gain: float = 0.1,
+        port: int = 0,
+    ) -> None:
+        self._robot, self._cable_model = robot, cable_model
+        self._drawn: CableRobot | None = None
+        self.snapshot = explore_pose(robot, pose, cable_model, gain=gain)
+        self.meshcat = _meshcat(port + 1 if port else 0)
+        self._page = PageServer(f"{robot.name} at rest", self.meshcat.port(), port)
+        scene.draw_surroundings(self.meshcat, robot)
+        # Between the panel and the controls.
+        scene.place_viewer(self.meshcat, robot, distance=1.9, aside=0.0)
+        scene.draw_platform(self.meshcat, "/refused", robot, REFUSED, ghost=True)
+        self._draw_bars()
+        self._add_controls(pose_to_vector(as_pose(pose)), gain)
+        self._values: tuple[float, ...] = ()
+        self.update()
+
+    @property
+    def address(self) -> str:
+        """Of the page, for a browser."""
+        return self._page.address
+
+    @property
+    def stopped(self) -> bool:
+        """Whether somebody has clicked on Stop."""
+        return self.meshcat.GetButtonClicks(STOP) > 0
+
+    def update(self) -> bool:
+        """Ask and draw anew if a slider has moved since the last time; return whether one has."""
+        values = tuple(map(self.meshcat.GetSliderValue, (*POSE, PAYLOAD, GAIN)))
+        if values == self._values:
+            return False
+        self._values = values
+        pose = np.array([*np.radians(values[:3]), *values[3:6]])
+        if abs(values[6] - self._robot.payload.mass) > 1e-9:
+            self._robot = self._robot.with_payload(values[6])
+        self.snapshot = explore_pose(self._robot, pose, self._cable_model, gain=values[7])
+        self._draw(self.snapshot)
+        return True
+
+    def run(self, idle: float = 0.0) -> str:
+        """Follow the sliders until somebody stops it, and return why it ended.
+
+        Args:
+            idle: time without a browser [s] after which to end; 0 for never.
+        """
+        last_seen = time.monotonic()
+        while not self.stopped:
+            if self.meshcat.GetNumActiveConnections():
+                last_seen = time.monotonic()
+            elif idle and time.monotonic() - last_seen > idle:
+                return f"no browser for {idle:g} s"
+            if not self.update():
+                time.sleep(PERIOD)
+        return "stopped in the browser"
+
+    def close(self) -> None:
+        """End both servers.
+
+        Drake aborts the process if Meshcat goes on another thread than it was made on, as it might
+        when garbage is collected; so it goes here.
+        """
+        self._page.close()
+        del self.meshcat
+
+    def _add_controls(self, pose: np.ndarray, gain: float) -> None:
+        low, high = _reach(self._robot)
+        begin = [*np.degrees(pose[:3]), *pose[3:]]
+        spans = [(-TILT, TILT, 0.5), (-TILT, TILT, 0.5), (-TURN, TURN, 0.5)]
+        spans += [(low[i], high[i], 0.01) for i in range(3)]
+        # Position first: it is what one drags most.
+        for i in (3, 4, 5, 0, 1, 2):
+            self._add_slider(POSE[i], *spans[i], begin[i])
+        mass = self._robot.payload.mass
+        most = _rounded_up(max(3.0 * self._robot.platform.mass, 2.0 * mass))
+        self._add_slider(PAYLOAD, 0.0, most, 1.0, mass)
+        self._add_slider(GAIN, 0.01, max(5.0, gain), 0.01, gain)
+        self.meshcat.AddButton(STOP)
+
+    def _add_slider(self, name: str, low: float, high: float, step: float, value: float) -> None:
+        low, high = min(low, value), max(high, value)
+        self.meshcat.AddSlider(name, low, high, step, value)
+
+    def _draw_bars(self) -> None:
+        """Draw bars of length 1, to be placed and stretched."""
+        bar = Cylinder(CABLE_RADIUS * scene.drawing_scale(self._robot), 1.0)
+        for cable in range(self._robot.num_cables):
+            for segment in range(SEGMENTS):
+                self.meshcat.SetObject(_bar_path(cable, segment), bar, Rgba(0.5, 0.5, 0.5))
+
+    def _draw(self, snapshot: Snapshot) -> None:
+        rests = snapshot.answers is not None
+        for path, visible in (("/platform", rests), ("/cables", rests), ("/refused", not rests)):
+            self.meshcat.SetProperty(path, "visible", visible)
+        if snapshot.robot is not self._drawn:
+            self.meshcat.Delete("/platform")
+            scene.draw_platform(self.meshcat, "/platform", snapshot.robot, scene.PLATFORM)
+            self._drawn = snapshot.robot
+        for path in ("/platform", "/refused"):
+            self.meshcat.SetTransform(path, snapshot.pose)
+        limits = (0.0, 1.0)
+        if snapshot.answers is not None:
+            limits = (0.0, _rounded_up(float(snapshot.answers.tension.max())))
+            self._draw_cables(snapshot, limits)
+        self._page.panel = panel_html(snapshot, limits)
+
+    def _draw_cables(self, snapshot: Snapshot, limits: tuple[float, float]) -> None:
+        assert snapshot.answers is not None
+        rest = snapshot.answers.rest.rest
+        pose = pose_to_vector(snapshot.pose)
+        shapes = cable_shapes(snapshot.robot, pose[None], rest.unstrained_length[None])[0]
+        colours = linear(tension_colours(snapshot.answers.tension, limits))
+        for cable, (points, colour) in enumerate(zip(shapes, colours, strict=True)):
+            for segment in range(SEGMENTS):
+                path = _bar_path(cable, segment)
+                X, length = scene.bar_pose(points[segment], points[segment + 1])
+                self.meshcat.SetTransform(path, X)
+                self.meshcat.SetProperty(path, "scale", [1.0, 1.0, length])
+                self.meshcat.SetProperty(f"{path}/<object>", "color", [*colour.tolist(), 1.0])
+
+
+def _meshcat(port: int) -> Meshcat:
+    """Return a Meshcat for this machine only; its own address is not logged: the page has it."""
+    log = logging.getLogger("drake")
+    level = log.level
+    log.setLevel(max(log.getEffectiveLevel(), logging.WARNING))
+    try:
+        return Meshcat(MeshcatParams(host=HOST, port=port, show_stats_plot=False))
+    finally:
+        log.setLevel(level)
+
+
+def _bar_path(cable: int, segment: int) -> str:
+    return f"/cables/{cable + 1}/{segment + 1}"
+
+
+def _reach(robot: CableRobot) -> tuple[Any, Any]:
+    """Return the corners (3,) of the box between the drawing points, down to the floor."""
+    low, high = robot.drawing_points.min(axis=0), robot.drawing_points.max(axis=0)
+    low[2] = min(0.0, low[2])
+    return np.ceil(10.0 * low) / 10.0, np.floor(10.0 * high) / 10.0
+
+
+def _rounded_up(value: float) -> float:
+    """Return the next of 1, 2, 5, 10, 20, ... from a value on, for the end of a scale."""
+    if value <= 0.0:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(value))
+    return next(float(m * power) for m in (1.0, 2.0, 5.0, 10.0) if m * power >= value * (1 - 1e-9))
