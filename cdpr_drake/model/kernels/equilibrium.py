@@ -176,7 +176,7 @@ def find_equilibrium(
         )
         if status:
             break
-        ahead = step @ new_wrench
+        ahead = float(step @ new_wrench)
         if tries < MAX_TRIES and ahead <= 0.0 and ahead < -0.5 * descent:
             # Beyond the lowest point along the step: go back by the secant of the slope.
             fraction *= max(0.1, descent / (descent - ahead))
@@ -190,7 +190,7 @@ def find_equilibrium(
             if np.abs(wrench).max() <= tolerance * weight:
                 break
             step = descent_step(wrench, stiffness)
-            fraction, descent, tries = 1.0, step @ wrench, 0
+            fraction, descent, tries = 1.0, float(step @ wrench), 0
         new_R = rotated(R, fraction * step[:3], turn)
         new_p = p + fraction * step[3:]
     return status, np.abs(wrench).max() / weight
