@@ -8,8 +8,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 
-# Run after each installation, e.g. to compile the kernels ahead of the first use. Empty: nothing.
-WARM ?=
+# Run after each installation, to compile the kernels ahead of the first use. Empty: nothing.
+WARM ?= $(BIN)/python -m cdpr_drake.commands.kernels
 BENCH := $(BIN)/python -m benchmarks
 
 # Another project's paths (ROS sets some) must not leak into the virtual environment.
@@ -42,8 +42,9 @@ lint: $(INSTALLED)-dev ## linter, formatter (nothing is rewritten) and type chec
 bench: $(INSTALLED)-bench ## the benchmarks, beside other programs' (NAME with ARGS=NAME)
 	@$(BENCH) $(ARGS)
 
+# Should it fail, the linter and the tests tell more.
 warm:
-	@$(or $(WARM),:)
+	-@$(or $(WARM),:)
 
 clean: ## remove the virtual environments, what was built, and caches
 	rm -rf .venv .venv-3.12 build dist *.egg-info

@@ -1,4 +1,4 @@
-"""Make the pictures of the README: the demo's figures and replay, the loop's blocks, the models.
+"""Make the pictures of the README: the demo's figures and replay, the loop and its models.
 
     python docs/make_images.py
 
@@ -30,6 +30,8 @@ from cdpr_drake.show import (
     screenshot_replay,
     stereo_view_figure,
 )
+from cdpr_drake.show.explorer import Explorer
+from cdpr_drake.show.screenshot import screenshot
 from cdpr_drake.study import compare_cable_models
 
 IMAGES = Path(__file__).resolve().parent / "images"
@@ -47,6 +49,7 @@ def make_images() -> None:
     start, _ = paper_test(4).poses(cogiro)
     camera_view_figure(cogiro, start).savefig(IMAGES / "camera_views.png", dpi=100)
     calibration_study(cogiro).savefig(IMAGES / "calibration_study.png", dpi=100)
+    explore_picture()
     with tempfile.TemporaryDirectory() as folder:
         output = Path(folder) / "demo"
         if main(["run", "--output", str(output)]):
@@ -61,6 +64,15 @@ def calibration_study(robot: CableRobot) -> Figure:
     cases = [(group, 1.0) for group in GROUPS] + [("all", 3.0), ("all", 10.0), ("all", 30.0)]
     move = (robot, *paper_test(4).poses(robot))
     return calibration_study_figure([calibration_effect(*move, *c, range(40)) for c in cases])
+
+
+def explore_picture() -> None:
+    """Write a picture of what `cdpr-drake explore` shows, a little off the start of Test 4."""
+    explorer = Explorer(load_robot("cogiro").with_payload(150.0), [0, 0, 0.35, 1.5, 0.5, 2.2])
+    try:
+        screenshot(explorer.address, IMAGES / "explore.png", settle=6.0, height=720)
+    finally:
+        explorer.close()
 
 
 def stereo_view() -> Figure:

@@ -577,6 +577,26 @@ def test_a_reader_that_stops_reading_is_no_error() -> None:
     assert process.wait(timeout=60) == 0
 
 
+RUN_AFTER_COMPILING = """
+from cdpr_drake.__main__ import main
+from cdpr_drake.commands.kernels import _kernels, compile_ahead
+compile_ahead()
+count = lambda: sum(len(kernel.signatures) for kernel in _kernels())
+before = count()
+assert before and not main(["run", "--until", "0.1", "--no-figures", "--no-replay"])
+print(count() - before, "more")
+"""
+
+
+@pytest.mark.needs("numba")
+def test_what_is_compiled_ahead_is_all_that_a_run_needs(here: Path) -> None:
+    result = subprocess.run(
+        [sys.executable, "-c", RUN_AFTER_COMPILING], capture_output=True, text=True, timeout=300
+    )
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.splitlines()[-1] == "0 more"
+
+
 @pytest.mark.skipif(os.name != "posix", reason="signals of other systems differ")
 def test_an_interrupt_ends_it_cleanly(here: Path) -> None:
     process = subprocess.Popen(

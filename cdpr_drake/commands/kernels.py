@@ -1,4 +1,9 @@
-"""Telling the user why the first run waits: the kernels are compiled, or there is no compiler."""
+"""Compiling the kernels ahead, and telling the user when that is done or cannot be.
+
+    python -m cdpr_drake.commands.kernels
+
+compiles what the default run needs, so that the first run need not wait.
+"""
 
 from __future__ import annotations
 
@@ -41,6 +46,17 @@ def compilation_announced() -> Iterator[None]:
         thread.join()
 
 
+def compile_ahead() -> None:
+    """Compile the kernels that the default run needs, unless that was done before."""
+    from cdpr_drake.commands.arguments import parse
+    from cdpr_drake.commands.plan import plan
+    from cdpr_drake.experiments import prepare
+
+    with compilation_announced():
+        for setup in plan(parse(["run"]))[1]:
+            prepare(setup)
+
+
 def _kernels() -> Iterator[Any]:
     """Yield the compiled functions of the kernel modules imported so far."""
     for name, module in list(sys.modules.items()):
@@ -48,3 +64,7 @@ def _kernels() -> Iterator[Any]:
             for value in list(vars(module).values()):
                 if hasattr(value, "py_func") and hasattr(value, "stats"):
                     yield value
+
+
+if __name__ == "__main__":
+    compile_ahead()

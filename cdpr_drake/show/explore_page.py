@@ -52,7 +52,7 @@ _SCRIPT = """
     }
   }
   update();
-  viewer.gui.width = 300;
+  viewer.gui.width = 280;
   viewer.gui.open();
   viewer.gui.__folders?.Scene?.close();
 })();

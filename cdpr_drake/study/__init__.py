@@ -7,6 +7,7 @@ from cdpr_drake.study.compare import (
     compare_cable_models,
 )
 from cdpr_drake.study.equilibrium import Residuals, equilibrium, residuals, true_pose
+from cdpr_drake.study.explore import Snapshot, explore_pose
 from cdpr_drake.study.gain_matrix import GainMap, GainMatrix, gain_matrix, map_gain_matrix
 from cdpr_drake.study.growth import SimulatedMode, simulate_modes
 from cdpr_drake.study.linear import LinearizationWarning, Linearizer, linearize
@@ -58,6 +59,7 @@ __all__ = [
     "ResponseMetrics",
     "SampledServo",
     "SimulatedMode",
+    "Snapshot",
     "StabilityMap",
     "StabilityWarning",
     "StateSpace",
@@ -68,6 +70,7 @@ __all__ = [
     "compare_cable_models",
     "equilibrium",
     "excursion",
+    "explore_pose",
     "gain_limit",
     "gain_matrix",
     "initial_response",
