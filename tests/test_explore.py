@@ -27,6 +27,7 @@ from cdpr_drake.study import gain_limit, gain_matrix, platform_modes
 from cdpr_drake.study.explore import Snapshot, explore_pose
 
 POSE = [0.0, 0.0, 0.3, -2.2, -0.6, 1.7]
+PIECES = ("/platform", "/cables", "/refused")
 SHORT_OF_CABLES = [0.0, 0.0, 0.0, 6.0, 5.0, 4.0]
 
 
@@ -179,6 +180,12 @@ def transform(explorer: Explorer, path: str) -> np.ndarray:
     return np.array(values).reshape(4, 4).T
 
 
+def is_visible(explorer: Explorer, path: str) -> bool:
+    """Whether Meshcat was told to show what is at a path."""
+    packed = explorer.meshcat._GetPackedProperty(path, "visible")
+    return {0xC3: True, 0xC2: False}[packed[-1]]
+
+
 def test_moving_a_slider_changes_snapshot_drawing_and_page(
     explorer: Explorer, robot: CableRobot
 ) -> None:
@@ -216,12 +223,15 @@ def test_the_bars_of_a_cable_reach_from_drawing_to_attachment_point(
 def test_beyond_the_workspace_the_page_says_so_and_comes_back(explorer: Explorer) -> None:
     for name, value in zip(("x [m]", "y [m]", "z [m]"), SHORT_OF_CABLES[3:], strict=True):
         explorer.meshcat.SetSliderValue(name, value)
+    explorer.meshcat.SetSliderValue(PAYLOAD, 20.0)  # which has the platform drawn anew
     assert explorer.update() and explorer.snapshot.answers is None
+    assert [is_visible(explorer, path) for path in PIECES] == [False, False, True]
     panel = get(explorer.address, "/panel")[1]
     assert "cannot rest here" in panel and "to push" in panel
     for name, value in zip(("x [m]", "y [m]", "z [m]"), POSE[3:], strict=True):
         explorer.meshcat.SetSliderValue(name, value)
     assert explorer.update() and explorer.snapshot.answers is not None
+    assert [is_visible(explorer, path) for path in PIECES] == [True, True, False]
     assert "cannot rest here" not in get(explorer.address, "/panel")[1]
 
 

@@ -145,13 +145,13 @@ class Explorer:
                 self.meshcat.SetObject(_bar_path(cable, segment), bar, Rgba(0.5, 0.5, 0.5))
 
     def _draw(self, snapshot: Snapshot) -> None:
-        rests = snapshot.answers is not None
-        for path, visible in (("/platform", rests), ("/cables", rests), ("/refused", not rests)):
-            self.meshcat.SetProperty(path, "visible", visible)
         if snapshot.robot is not self._drawn:
             self.meshcat.Delete("/platform")
             scene.draw_platform(self.meshcat, "/platform", snapshot.robot, scene.PLATFORM)
             self._drawn = snapshot.robot
+        rests = snapshot.answers is not None
+        for path, visible in (("/platform", rests), ("/cables", rests), ("/refused", not rests)):
+            self.meshcat.SetProperty(path, "visible", visible)
         for path in ("/platform", "/refused"):
             self.meshcat.SetTransform(path, snapshot.pose)
         limits = (0.0, 1.0)
