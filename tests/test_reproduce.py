@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import html
+import importlib.util
 import json
 import re
 import subprocess
@@ -11,6 +13,7 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor, ThreadPoolExecutor
 from html.parser import HTMLParser
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -300,12 +303,13 @@ def test_the_page_fits_a_phone(page: str, tmp_path: Path) -> None:
 
 def test_numbers_in_words() -> None:
     cases = {
-        31.6: "31.6", -31.62: "-31.6", 0.0123: "0.0123", 1234.5: "1234", 0.0: "0", 50.0: "50",
-        4.35: "4.35", 1e-9: "1e-09", 7: "7", 123.4: "123", None: "", True: "yes", "a": "a",
+        31.6: "31.6", -31.62: "-31.6", 0.0123: "0.0123", 1234.5: "1234", 0.0: "0", 50.0: "50.0",
+        4.35: "4.35", 0.08: "0.08", 1.0 / 3.0: "0.333", 120.0: "120", 1e-9: "1e-09", 7: "7",
+        None: "", True: "yes", "a": "a",
     }  # fmt: skip
     for value, text in cases.items():
         assert in_words(value) == text
-    assert in_words([1, 2.5]) == "1, 2.50" and in_words(float("nan")) == ""
+    assert in_words([1, 2.5]) == "1, 2.5" and in_words(float("nan")) == ""
 
 
 def test_pictures_say_what_they_show(fakes: dict[str, Reproduction]) -> None:
@@ -362,7 +366,9 @@ def test_a_figure_is_made_of_its_runs(part: figures.PaperFigure) -> None:
     for text, agrees in verdicts.items():
         if "exponentially" in text or "least tensed" in text or "most tensed" in text:
             assert agrees, text
-        if "moves by" in text or "larger in the experiments" in text:
+        if "moves by" in text:
+            assert agrees, text
+        if "larger in the experiments" in text:
             assert not agrees, text
     tensions = [p for row in section.figures[0].panels for p in row if "tension" in p.y_label]
     assert all(len(panel.lines) == 8 for panel in tensions)
@@ -371,13 +377,15 @@ def test_a_figure_is_made_of_its_runs(part: figures.PaperFigure) -> None:
     assert not any(agrees for text, agrees in again.items() if "exponentially" in text)
 
 
-def test_amplitudes_agree_when_they_are_the_printed_ones() -> None:
+def test_an_amplitude_that_is_not_the_printed_one_differs(monkeypatch: pytest.MonkeyPatch) -> None:
     part = figures.FIGURES[0]
-    result = decay(0.03, np.ones(8))
-    metres, degrees = printed("figures")["amplitude_1"].value
-    result["error"][0] = [1e3 * metres, 0.0, 0.0, degrees, 0.0, 0.0]
-    claims = part.section({part.cases()[0].key: result}).claims
-    assert claims[0].agrees and claims[0].ours == "4.35 m, 8.0°"
+    results = {part.cases()[0].key: decay(0.03, np.ones(8))}
+    claim = part.section(results).claims[0]
+    assert claim.agrees and claim.printed == "4.35 m, 8.0°" and claim.ours.startswith("4.35 m, 8.")
+    entry = printed("figures")["amplitude_1"]
+    others = {**printed("figures"), "amplitude_1": dataclasses.replace(entry, value=[4.37, 8.0])}
+    monkeypatch.setattr(figures, "printed", lambda section: others)
+    assert not part.section(results).claims[0].agrees
 
 
 # --- the command
@@ -450,3 +458,53 @@ def test_bad_input_costs_one_line(
     out, err = capsys.readouterr()
     assert out == "" and len(err.splitlines()) == 1 and re.search(message, err)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+# --- the pages made from a report
+
+
+@pytest.fixture(scope="module")
+def pages() -> ModuleType:
+    """The script that fills README and docs."""
+    spec = importlib.util.spec_from_file_location("pages", ROOT / "docs" / "make_reproduction.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_readme_and_docs_say_what_the_kept_report_says(pages: ModuleType) -> None:
+    report = json.loads(pages.REPORT.read_text(encoding="utf-8"))
+    assert [section["name"] for section in report["sections"]] == list(reproductions())
+    assert not any(section["errors"] for section in report["sections"])
+    for page in pages.PAGES:
+        text = page.read_text(encoding="utf-8")
+        assert pages.MARK.search(text), f"{page.name} has no marks"
+        assert pages.filled(text, report) == text, f"{page.name}: run docs/make_reproduction.py"
+        for picture in re.findall(r"\]\((images/[^)]+)\)", text):
+            assert (pages.DOCS / picture).is_file(), picture
+
+
+def test_every_section_of_the_report_is_in_the_docs(pages: ModuleType) -> None:
+    text = (pages.DOCS / "reproduction.md").read_text(encoding="utf-8")
+    assert set(reproductions()) <= {mark[1] for mark in pages.MARK.findall(text)}
+
+
+def test_pages_are_filled_between_their_marks_only(
+    pages: ModuleType, fakes: dict[str, Reproduction], threads: Executor, tmp_path: Path
+) -> None:
+    report, _ = made(fakes, tmp_path / "kept", threads)
+    page = (
+        "A\n<!-- begin summary -->\nold\n<!-- end summary -->\nB\n"
+        "<!-- begin two -->\n<!-- end two -->\n"
+    )
+    text = pages.filled(page, report)
+    assert text.startswith("A\n<!-- begin summary -->\n2 of 4 claims agree, 2 differ.\n\n|")
+    assert "old" not in text and "\n<!-- end summary -->\nB\n" in text
+    assert r"| one | one is \<b\>exact\</b\> | 3.14 | 2.72 | differs |" in text
+    assert "| 0 | 2.0 | 4.0 |  |  |" in text and "![Lines](images/two.png)" in text
+    assert pages.filled(text, report) == text
+    with pytest.raises(KeyError, match="nobody"):
+        pages.filled("<!-- begin nobody -->\n<!-- end nobody -->\n", report)
+    with pytest.raises(ValueError, match="no end"):
+        pages.filled("<!-- begin two -->\n<!-- end one -->\n", report)

@@ -106,7 +106,7 @@ def _section(section: Mapping[str, Any], figures: Sequence[Figure]) -> Iterable[
 def _claim(claim: Mapping[str, Any]) -> Iterable[str]:
     word = verdict(claim)
     yield f'<article class="{word}">'
-    text = escape(claim["text"][:1].upper() + claim["text"][1:])
+    text = escape(_capital(claim["text"]))
     yield f'<h3><span class="mark">{word}</span>{text}</h3>'
     yield (
         f"<dl><div><dt>paper</dt><dd>{escape(claim['printed'])}</dd></div>"
@@ -115,6 +115,12 @@ def _claim(claim: Mapping[str, Any]) -> Iterable[str]:
     if claim["reason"]:
         yield f'<p class="quiet">{escape(claim["reason"])}</p>'
     yield "</article>"
+
+
+def _capital(text: str) -> str:
+    """Return a sentence with a capital at its start, unless that is a symbol such as dβ."""
+    is_word = text[:2].isascii() and text[:2].isalpha()
+    return text[:1].upper() + text[1:] if is_word else text
 
 
 def _figure(figure: Figure, salt: str) -> Iterable[str]:
@@ -134,7 +140,10 @@ def _table(
     title: str, headings: Sequence[str], rows: Sequence[Sequence[Any]], note: str = ""
 ) -> Iterable[str]:
     yield f'<h3>{escape(title)}</h3><div class="wide"><table>'
-    yield f"<thead><tr>{''.join(f'<th>{escape(h)}</th>' for h in headings)}</tr></thead><tbody>"
+    columns = zip(*rows, strict=True) if rows else [()] * len(headings)
+    kinds = [_kind(all(v is None or _is_number(v) for v in column)) for column in columns]
+    head = (f"<th{kind}>{escape(h)}</th>" for h, kind in zip(headings, kinds, strict=True))
+    yield f"<thead><tr>{''.join(head)}</tr></thead><tbody>"
     for row in rows:
         yield f"<tr>{''.join(map(_cell, row))}</tr>"
     yield "</tbody></table></div>"
@@ -143,9 +152,15 @@ def _table(
 
 
 def _cell(value: Any) -> str:
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    kind = ' class="number"' if is_number else ""
-    return f"<td{kind}>{escape(in_words(value))}</td>"
+    return f"<td{_kind(_is_number(value))}>{escape(in_words(value))}</td>"
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _kind(is_number: bool) -> str:
+    return ' class="number"' if is_number else ""
 
 
 def _assumptions(section: Mapping[str, Any]) -> Iterable[str]:

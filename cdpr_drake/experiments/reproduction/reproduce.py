@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 import time
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from cdpr_drake.experiments.reproduction.assumptions import Assumption, assumpti
 from cdpr_drake.experiments.reproduction.section import Case, Reproduction, Result, Section
 from cdpr_drake.experiments.reproduction.sources import source_of
 from cdpr_drake.study import Sweep, sweep
+from cdpr_drake.study.step_size import StepWarning
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,7 +104,10 @@ def carry_out(function: Callable[..., Result], arguments: Mapping[str, Any], sou
         arguments: of a case.
         source: which makes cases of changed code different ones.
     """
-    return function(**arguments)
+    with warnings.catch_warnings():
+        # The sections choose their steps for what they look at, and say how exact that is.
+        warnings.simplefilter("ignore", StepWarning)
+        return function(**arguments)
 
 
 def _collect(

@@ -10,7 +10,7 @@ DIGITS = 3
 
 
 def in_words(value: Any) -> str:
-    """Return a cell of a table as text: numbers to three digits, nothing for None.
+    """Return a cell of a table as text: numbers to at most three digits, nothing for None.
 
     Args:
         value: a number, a text, None, or a list of these.
@@ -33,12 +33,11 @@ def _number(value: float) -> str:
         return f"{value:.0f}"
     if value == 0.0:
         return "0"
-    decimals = DIGITS - 1 - math.floor(math.log10(abs(value)))
+    decimals = max(DIGITS - 1 - math.floor(math.log10(abs(value))), 0)
     if decimals > 6:
         return f"{value:.2g}"
-    text = f"{value:.{max(decimals, 0)}f}"
-    is_whole = value == round(value) and abs(value) < 10.0**DIGITS
-    return f"{value:.0f}" if is_whole else text
+    given = len(repr(value).partition(".")[2])  # a number that was rounded gets no more digits
+    return f"{value:.{min(decimals, given)}f}"
 
 
 def verdict(claim: Mapping[str, Any]) -> str:
