@@ -14,8 +14,9 @@ from cdpr_drake.diagrams.robot import ROBOT_OUTPUTS, make_cable_robot
 from cdpr_drake.model.modelled import MODELLED
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.servo import ServoSettings
-from cdpr_drake.model.vision.outages import Outage
+from cdpr_drake.model.vision.outages import LOAD_CELL, Outage
 from cdpr_drake.systems import (
+    FusedPlant,
     InverseKinematicsAngles,
     LoadCellFilter,
     ModelledTangents,
@@ -43,6 +44,7 @@ def make_vision_based_control(
     estimator: str = "joint",
     outages: tuple[Outage, ...] = (),
     modelled: tuple[str, ...] = (),
+    fused: bool = False,
     settings: ServoSettings | None = None,
     **servo: Any,
 ) -> Diagram:
@@ -93,6 +95,9 @@ def make_vision_based_control(
         outages: when load cells are stuck or dead and, with targets or images, cameras see nothing.
         modelled: "tensions" and "tangents" that the law takes from the model at the measured pose:
             blocks "tension_model" and "tangent_model" instead of the sensors.
+        fused: whether blocks "robot", "load_cells" and "integrator" are one `FusedPlant` named
+            "robot": the same loop, some three times as fast, for floats only. Load cells then
+            neither fail nor vibrate.
         settings: the law's other settings; its cable_model and gain give way to those above.
         servo: fields of ServoSettings (order, ramp_time, max_speed, max_angular_speed,
             model_drum_run), over those of `settings`.
@@ -102,7 +107,8 @@ def make_vision_based_control(
         RenderingError: with images, Drake cannot render on this machine.
         RobotFileError: with targets or images, the robot lacks the cameras or patterns they need.
         ValueError: a gain, period or latency out of range; gain * sample_time >= 1; unknown
-            sensors; targets or images without sampling or latency; what cannot be modelled.
+            sensors; targets or images without sampling or latency; what cannot be modelled or
+            fused.
     """
     believed = calibrated if calibrated is not None else robot
     k = robot.num_cables
@@ -117,20 +123,18 @@ def make_vision_based_control(
     check_modelled(modelled)
 
     builder = DiagramBuilder()
-    plant = builder.AddNamedSystem("robot", make_cable_robot(robot))
+    plant, cells, integrator = _add_plant(builder, robot, believed, outages, modelled, fused)
     pose = plant.GetOutputPort("pose")
     camera, noise_ports = add_pose_cameras(
         builder, pose, robot, believed, sensors, sample_time, estimator, outages
     )
-    tangents = cells = None
+    tangents = None
     if "tangents" not in modelled:
         tangents = add_tangent_cameras(builder, robot, believed, sensors, sample_time, outages)
         noise_ports["tangent_noise"] = tangents.GetInputPort("noise")
-    if "tensions" not in modelled:
-        cells = builder.AddNamedSystem("load_cells", LoadCellFilter(robot, believed, outages))
+    if cells is not None:
         noise_ports["tension_noise"] = cells.GetInputPort("noise")
     servo_law = builder.AddNamedSystem("servo", PositionBasedVisualServo(believed, law))
-    integrator = builder.AddNamedSystem("integrator", MotorAngleIntegrator(k))
     error = builder.AddNamedSystem("true_error", PoseError(robot))
 
     builder.Connect(pose, error.GetInputPort("pose"))
@@ -140,8 +144,6 @@ def make_vision_based_control(
         builder.Connect(measured["pose"], model.get_input_port())
         measured["tension"] = model.get_output_port()
     else:
-        tension = plant.GetOutputPort("tension_at_winch")
-        builder.Connect(tension, cells.GetInputPort("tension_at_winch"))
         measured["tension"] = cells.GetOutputPort("measured_tension")
     if tangents is not None:
         seen = {"tangents": plant.GetOutputPort("tangents_at_drawing_point")}
@@ -172,9 +174,6 @@ def make_vision_based_control(
     for name, port in (measured | {"tension": plausible.get_output_port()}).items():
         builder.Connect(port, servo_law.GetInputPort(f"measured_{name}"))
     builder.Connect(rates, integrator.GetInputPort("motor_rates"))
-    builder.Connect(
-        integrator.GetOutputPort("motor_angles"), plant.GetInputPort("desired_motor_angles")
-    )
 
     _export_input(builder, "desired_pose", servo_law, error)
     builder.ExportInput(servo_law.GetInputPort("desired_twist"), "desired_twist")
@@ -187,8 +186,39 @@ def make_vision_based_control(
     for name, port in measured.items():
         builder.ExportOutput(port, f"measured_{name}")
     builder.ExportOutput(rates, "commanded_motor_rates")
-    builder.ExportOutput(integrator.GetOutputPort("motor_angles"), "desired_motor_angles")
+    angles = "desired_motor_angles" if fused else "motor_angles"
+    builder.ExportOutput(integrator.GetOutputPort(angles), "desired_motor_angles")
     return _finish(builder, plant, "vision_based_control")
+
+
+def _add_plant(
+    builder: DiagramBuilder,
+    robot: CableRobot,
+    believed: CableRobot,
+    outages: tuple[Outage, ...],
+    modelled: tuple[str, ...],
+    fused: bool,
+) -> tuple[Any, Any, Any]:
+    """Add what is continuous; return what has the robot's, the load cells', the integrator's ports.
+
+    There are no load cells where tensions are modelled.
+    """
+    measures = "tensions" not in modelled
+    if fused:
+        if any(outage.sensor == LOAD_CELL for outage in outages):
+            raise ValueError("load cells that fail need the blocks: fused=False")
+        plant = builder.AddNamedSystem("robot", FusedPlant(robot, believed))
+        return plant, plant if measures else None, plant
+    plant = builder.AddNamedSystem("robot", make_cable_robot(robot))
+    cells = None
+    if measures:
+        cells = builder.AddNamedSystem("load_cells", LoadCellFilter(robot, believed, outages))
+        tension = plant.GetOutputPort("tension_at_winch")
+        builder.Connect(tension, cells.GetInputPort("tension_at_winch"))
+    integrator = builder.AddNamedSystem("integrator", MotorAngleIntegrator(robot.num_cables))
+    angles = integrator.GetOutputPort("motor_angles")
+    builder.Connect(angles, plant.GetInputPort("desired_motor_angles"))
+    return plant, cells, integrator
 
 
 def make_joint_space_control(

@@ -16,6 +16,7 @@ from cdpr_drake.model.equilibrium import RestState, forward_kinematics, rest_sta
 from cdpr_drake.model.inverse_kinematics import InverseKinematics, motor_angles
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, pose_to_vector
+from cdpr_drake.systems.fused_plant import FusedPlant
 from cdpr_drake.systems.held_pose import HeldPose
 from cdpr_drake.systems.stereo import StereoCameras
 
@@ -93,6 +94,11 @@ def set_at_rest(diagram: Diagram, context: Context, rest: RestState) -> None:
             own.SetContinuousState(np.tile(system.reading(tension), order))
         elif name == "integrator":
             own.SetContinuousState(desired)
+        elif isinstance(system, FusedPlant):
+            filtered = np.tile(system.reading(tension), robot.load_cells.order)
+            platform = [pose_to_vector(rest.X_WP), np.zeros(6)]
+            winches = [angles, np.zeros(robot.num_cables), integral]
+            own.SetContinuousState(np.concatenate([*platform, *winches, filtered, desired]))
         elif name == "held_rates":
             own.SetDiscreteState(np.zeros(system.get_output_port().size()))
     port = _input_port(diagram, "desired_motor_angles")
@@ -139,13 +145,15 @@ def robot_of(diagram: Diagram) -> CableRobot:
         ValueError: it has no block "cables".
     """
     for path, system in leaf_systems(diagram):
-        if path[-1] == "cables":
+        if path[-1] == "cables" or isinstance(system, FusedPlant):
             return system.robot
     raise ValueError(f'diagram "{diagram.get_name()}" has no block "cables", so no cable robot')
 
 
 def _rest(systems: dict[tuple[str, ...], Any], X_WP: RigidTransform, tensions: str) -> RestState:
-    robot = next(s.robot for path, s in systems.items() if path[-1] == "cables")
+    robot = next(
+        s.robot for path, s in systems.items() if path[-1] == "cables" or isinstance(s, FusedPlant)
+    )
     for path, system in systems.items():
         if path[-1] == "inverse_kinematics":
             angles = InverseKinematics(system.robot, system.cable_model).motor_angles(X_WP)

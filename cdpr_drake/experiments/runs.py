@@ -32,7 +32,7 @@ from cdpr_drake.model.cable_models import CABLE_MODELS
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.rotations import Array, as_pose, pose_to_vector
 from cdpr_drake.model.servo import PoseErrorMap
-from cdpr_drake.model.vision.outages import Outage
+from cdpr_drake.model.vision.outages import LOAD_CELL, Outage
 from cdpr_drake.model.vision.pose import ESTIMATORS
 from cdpr_drake.study.modes import platform_modes
 from cdpr_drake.study.stability import SampledServo, StabilityWarning, find_gain_limit
@@ -332,6 +332,7 @@ def _make_loop(setup: Setup) -> Diagram:
             estimator=setup.estimator,
             outages=setup.outages,
             modelled=setup.modelled,
+            fused=_can_fuse(setup),
             ramp_time=setup.ramp_time,
         )
     loop = make_joint_space_control(
@@ -342,6 +343,12 @@ def _make_loop(setup: Setup) -> Diagram:
     )
     _check_path(setup, reference)
     return with_reference(loop, reference)
+
+
+def _can_fuse(setup: Setup) -> bool:
+    """Return whether the robot, load cells and integrator can run as one system."""
+    fails = any(outage.sensor == LOAD_CELL for outage in setup.outages)
+    return not fails and setup.robot.load_cells.vibration_amplitude == 0.0
 
 
 def _evaluate_all(loop: Diagram, context: Context) -> None:

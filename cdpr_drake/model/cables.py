@@ -30,6 +30,9 @@ def packed_sizes(num_cables: int) -> dict[str, int]:
 class CableSet:
     """All k cables of a robot between their winches and the platform.
 
+    Attributes:
+        numbers: points and constants, as kernels/platform.py takes them.
+
     Args:
         robot: the robot.
     """
@@ -46,6 +49,7 @@ class CableSet:
         stiffness = cable.stiffness.as_array()
         scalars = [robot.weight_per_metre, *stiffness, cable.damping_time, cable.breaking_load]
         self._constants = np.array([*scalars, *cable.drum_run], float)
+        self.numbers = (self._points, self._constants)
         self._cable = (scalars[0], stiffness, self._constants[6:], cable.damping_time)
 
     def __call__(self, state: Array, length: Array, rate: Array) -> tuple[Array, int]:

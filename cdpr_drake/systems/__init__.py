@@ -1,7 +1,7 @@
 """The pieces of the robot and its control: each a Drake LeafSystem.
 
-All are for float and AutoDiffXd, but for the sampled cameras, which OpenCV works for, and for what
-stands in for sensors.
+All are for float and AutoDiffXd, but for the sampled cameras, which OpenCV works for, for what
+stands in for sensors, and for `FusedPlant`, which is several of them in one, for speed.
 """
 
 from cdpr_drake.systems.cable_force import CatenaryCableForce, CatenaryCableForce_
@@ -11,6 +11,7 @@ from cdpr_drake.systems.camera import (
     CameraMeasurement,
     CameraMeasurement_,
 )
+from cdpr_drake.systems.fused_plant import FusedPlant
 from cdpr_drake.systems.image_targets import ImageTargets
 from cdpr_drake.systems.joint_space import (
     ExponentialApproach,
@@ -45,6 +46,7 @@ __all__ = [
     "CatenaryCableForce_",
     "ExponentialApproach",
     "ExponentialApproach_",
+    "FusedPlant",
     "ImageTargets",
     "InverseKinematicsAngles",
     "InverseKinematicsAngles_",

@@ -88,7 +88,7 @@ def CatenaryCableForce_(T: type) -> type:
                     packed = chain(packed, np.split(jacobian, [12, 12 + self._k], axis=1), *args)
             if status:
                 check_finite(value(args[0]), self, context, "input platform_state")
-                self._raise(context, value(args[1]), value(packed), status)
+                raise_cable_error(self.robot, context, value(args[1]), value(packed), status)
             output.SetFromVector(packed)
 
         def _part(self, part: slice) -> Any:
@@ -97,18 +97,31 @@ def CatenaryCableForce_(T: type) -> type:
 
             return calc
 
-        def _raise(self, context: Any, length: np.ndarray, packed: np.ndarray, status: int) -> None:
-            time = float(value(np.array([context.get_time()]))[0])
-            cable, k = abs(status), self._k
-            if status > 0:
-                what = f"no catenary of unstrained length {length[cable - 1]:.6g} m"
-            else:
-                limit = self.robot.cable.breaking_load
-                highest = packed[5 + cable : 6 + 2 * k : k].max()
-                what = f"{highest:.0f} N is above the breaking load of {limit:.0f} N"
-            raise CableError(cable, time, what)
-
     return Impl
 
 
 CatenaryCableForce = CatenaryCableForce_[None]
+
+
+def raise_cable_error(
+    robot: CableRobot, context: Any, length: np.ndarray, packed: np.ndarray, status: int
+) -> None:
+    """Raise what a status of `CableSet` that is not 0 means.
+
+    Args:
+        robot: the robot.
+        context: of the system that solved for the cables, for the time.
+        length: (k,) total unstrained lengths [m].
+        packed: as `CableSet` gives it.
+        status: likewise.
+
+    Raises:
+        CableError: always.
+    """
+    time = float(value(np.array([context.get_time()]))[0])
+    cable, k = abs(status), robot.num_cables
+    if status > 0:
+        raise CableError(cable, time, f"no catenary of unstrained length {length[cable - 1]:.6g} m")
+    highest = packed[5 + cable : 6 + 2 * k : k].max()
+    limit = robot.cable.breaking_load
+    raise CableError(cable, time, f"{highest:.0f} N is above the breaking load of {limit:.0f} N")

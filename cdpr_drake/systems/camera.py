@@ -119,7 +119,7 @@ def CableTangentCameras_(T: type) -> type:
             noisy = value(u) + self._sigma * value(noise)
             check_finite(noisy, self, context, "inputs")
             noisy = noisy.reshape(-1, 3)
-            norm = np.linalg.norm(noisy, axis=1, keepdims=True)
+            norm = np.sqrt(np.einsum("ij,ij->i", noisy, noisy))[:, np.newaxis]
             unit = noisy / norm
             if T is float:
                 output.SetFromVector(unit.ravel())

@@ -47,6 +47,9 @@ def LoadCellFilter_(T: type) -> type:
             calibrated: the robot as the controller believes it; the true one if None.
             outages: when cells are stuck, which stops their filters too, or dead.
 
+        Attributes:
+            parameters: (4, k), as kernels/load_cell.py takes them.
+
         Raises:
             ValueError: an outage of a cell that is not there.
         """
@@ -68,7 +71,7 @@ def LoadCellFilter_(T: type) -> type:
             gain, sigma = cells.gain / believed.gain, cells.noise / believed.gain
             bias = (cells.bias - believed.bias) / believed.gain
             rate = np.full(robot.num_cables, 2.0 * np.pi * cells.cutoff)
-            self._filter, self._parameters = filter_derivatives, np.array([gain, bias, sigma, rate])
+            self._filter, self.parameters = filter_derivatives, np.array([gain, bias, sigma, rate])
             self._order = cells.order
             k = self._k = robot.num_cables
             self.outages = tuple(outages)
@@ -98,7 +101,7 @@ def LoadCellFilter_(T: type) -> type:
             Args:
                 tension_at_winch: (k,) [N].
             """
-            gain, bias, _, _ = self._parameters
+            gain, bias, _, _ = self.parameters
             return gain * tension_at_winch + bias
 
         def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
@@ -111,10 +114,10 @@ def LoadCellFilter_(T: type) -> type:
                 tension = tension + self._vibration(_seconds(context))
             xdot = np.empty(x.size)
             if T is float:
-                finite = self._filter(x, tension, noise, self._parameters, xdot)
+                finite = self._filter(x, tension, noise, self.parameters, xdot)
             else:
                 plain = value(x), value(tension), value(noise)
-                finite = self._filter(*plain, self._parameters, xdot)
+                finite = self._filter(*plain, self.parameters, xdot)
             if not finite:
                 check_finite(xdot, self, context, "derivatives")
             if T is not float:
@@ -125,7 +128,7 @@ def LoadCellFilter_(T: type) -> type:
 
         def _jacobians(self) -> list[np.ndarray]:
             """Return those of the derivatives by state, tension and noise: all is linear."""
-            gain, _, sigma, rate = self._parameters
+            gain, _, sigma, rate = self.parameters
             k, n = self._k, self._k * self._order
             through = np.eye(n, n, -k) - np.eye(n)
             return [rate[0] * through, np.eye(n, k) * rate * gain, np.eye(n, k) * rate * sigma]
@@ -142,7 +145,7 @@ def LoadCellFilter_(T: type) -> type:
                     xdot[cell::k] = 0.0 * x[cell::k]
                 else:
                     y = (reading - believed.bias[cell]) / believed.gain[cell]
-                    xdot[cell] = self._parameters[3, cell] * (y - x[cell])
+                    xdot[cell] = self.parameters[3, cell] * (y - x[cell])
 
         def _calc_tension(self, context: Any, output: Any) -> None:
             output.SetFromVector(context.get_continuous_state_vector().CopyToVector()[-self._k :])

@@ -1,0 +1,111 @@
+"""All that is continuous in the vision-based loop, in one function.
+
+The state is y = [roll, pitch, yaw, x, y, z, omega, v of the platform in W (12); motor angles (k);
+their rates (k); integrals of the angle errors (k); filters of the load cells (n_f k); desired motor
+angles (k)], SI units and radians. out: the result, of the length of the state it is of.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cdpr_drake.model.kernels import jit
+from cdpr_drake.model.kernels.load_cell import filter_derivatives
+from cdpr_drake.model.kernels.platform import platform_cable_forces
+from cdpr_drake.model.kernels.servo import rpy_matrix
+from cdpr_drake.model.kernels.winch import winch_derivatives
+
+NOT_FINITE = 1_000_000
+"""Status of `plant_derivatives` where the cables are well but a derivative is not finite."""
+
+
+@jit
+def _product(M, x, y, z):
+    """Return the product of M (3, 3) and (x, y, z)."""
+    return (
+        float(M[0, 0]) * x + float(M[0, 1]) * y + float(M[0, 2]) * z,
+        float(M[1, 0]) * x + float(M[1, 1]) * y + float(M[1, 2]) * z,
+        float(M[2, 0]) * x + float(M[2, 1]) * y + float(M[2, 2]) * z,
+    )
+
+
+@jit
+def _cross(a, b):
+    """Return a x b."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+@jit
+def platform_derivatives(state, wrench, solid, out):
+    """Write the derivatives (12,) of the platform under a wrench [torque; force] at its origin.
+
+    solid (8, 3) = [mass, gravity, 0; p_PG; inertia about G in P (3 rows); its inverse (3 rows)].
+    """
+    R = np.zeros((3, 3))
+    roll, pitch, yaw = float(state[0]), float(state[1]), float(state[2])
+    rpy_matrix(roll, pitch, yaw, R)
+    Rt, inertia, inverse = R.T, solid[2:5], solid[5:8]
+    mass, gravity = float(solid[0, 0]), float(solid[0, 1])
+    EG = _product(R, float(solid[1, 0]), float(solid[1, 1]), float(solid[1, 2]))
+    omega = (float(state[6]), float(state[7]), float(state[8]))
+    fx, fy, fz = float(wrench[3]), float(wrench[4]), float(wrench[5])
+    # About G the weight has no moment, and the other forces act at the platform's origin.
+    shift = _cross(EG, (fx, fy, fz))
+    tx, ty, tz = float(wrench[0]) - shift[0], float(wrench[1]) - shift[1], float(wrench[2])
+    torque = _product(Rt, tx, ty, tz - shift[2])
+    w = _product(Rt, omega[0], omega[1], omega[2])
+    gyro = _cross(w, _product(inertia, w[0], w[1], w[2]))
+    a = _product(inverse, torque[0] - gyro[0], torque[1] - gyro[1], torque[2] - gyro[2])
+    alpha = _product(R, a[0], a[1], a[2])
+    tangential = _cross(alpha, EG)
+    centripetal = _cross(omega, _cross(omega, EG))
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    along = (cy * omega[0] + sy * omega[1]) / math.cos(pitch)
+    out[0] = along
+    out[1] = cy * omega[1] - sy * omega[0]
+    out[2] = omega[2] + along * math.sin(pitch)
+    out[3], out[4], out[5] = state[9], state[10], state[11]
+    out[6], out[7], out[8] = alpha
+    out[9] = fx / mass - tangential[0] - centripetal[0]
+    out[10] = fy / mass - tangential[1] - centripetal[1]
+    out[11] = fz / mass - gravity - tangential[2] - centripetal[2]
+
+
+@jit
+def plant_derivatives(y, rates, noise, wrench, points, constants, solid, winch, cells, out):
+    """Write dy/dt and return the status of `platform_cable_forces`, or NOT_FINITE.
+
+    rates (k,): of the desired motor angles; noise (k,): of the load cells, standard normal; wrench
+    (6,): on the platform besides its cables and weight; points, constants: as in kernels/platform;
+    solid: as above; winch: as in kernels/winch; cells (5, k): gains, biases, sigmas and rates of
+    the load cells as in kernels/load_cell, and the unstrained lengths at motor angle zero.
+    """
+    k = rates.shape[0]
+    n = y.shape[0]
+    r = float(winch[6])
+    packed = np.empty(6 + 9 * k)
+    winches = np.empty(5 * k)
+    length = cells[4] + r * y[12 : 12 + k]
+    status = platform_cable_forces(
+        y[:12], length, r * y[12 + k : 12 + 2 * k], points, constants, packed
+    )
+    if status != 0:
+        return status
+    platform_derivatives(y[:12], packed[:6] + wrench, solid, out[:12])
+    is_finite = winch_derivatives(y[12 : 12 + 3 * k], y[n - k :], packed[6 : 6 + k], winch, winches)
+    out[12 : 12 + 3 * k] = winches[: 3 * k]
+    first = 12 + 3 * k
+    filters = filter_derivatives(
+        y[first : n - k], winches[4 * k :], noise, cells[:4], out[first : n - k]
+    )
+    size = 0.0
+    for i in range(12):
+        size += abs(float(out[i]))
+    for i in range(k):
+        size += abs(float(rates[i]))
+        out[n - k + i] = rates[i]
+    if is_finite and filters and size < np.inf:
+        return 0
+    return NOT_FINITE
