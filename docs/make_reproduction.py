@@ -92,13 +92,12 @@ def _effort(report: Mapping[str, Any]) -> Iterable[str]:
 
 def _section(section: Mapping[str, Any]) -> Iterable[str]:
     """Yield the text, the claims and the tables of a section."""
-    for paragraph in section["text"]:
-        yield _escaped(paragraph)
-        yield ""
+    yield from "\n\n".join(map(_escaped, section["text"])).split("\n")
     rows = [
         (c["text"], c["printed"], c["ours"], verdict(c), c["reason"]) for c in section["claims"]
     ]
     if rows:
+        yield ""
         yield from _table(("claim", "paper", "here", "", "why, or on what terms"), rows)
     for number in range(len(section["figures"])):
         file = section["name"] + (f"-{number + 1}" if number else "")
