@@ -152,7 +152,7 @@ def _table(
 
 
 def _cell(value: Any) -> str:
-    return f"<td{_kind(_is_number(value))}>{escape(in_words(value))}</td>"
+    return f"<td{_kind(value is None or _is_number(value))}>{escape(in_words(value))}</td>"
 
 
 def _is_number(value: Any) -> bool:
