@@ -28,6 +28,7 @@ QUICK = {
     "rendered_loop": ["--gain", "0.8", "--until", "8"],
     "scale": ["--rounds", "3", "--work", "8", "--until", "10"],
     "study": ["--duration", "10", "--robots", "3"],
+    "sweep": ["--cases", "4", "--until", "10"],
     "vision": ["--rounds", "30"],
 }
 

@@ -25,6 +25,7 @@ from benchmarks import (
     bench_peers_loop,
     bench_scale,
     bench_study,
+    bench_sweep,
     bench_vision,
     harness,
 )
@@ -40,6 +41,7 @@ SMALLEST: dict[str, tuple[Any, str]] = {
     "peers_loop": (bench_peers_loop, "--until 0.3 --rounds 1"),
     "scale": (bench_scale, "--rounds 1 --calls 5 --work 0"),
     "study": (bench_study, "--only theory --robots 1"),
+    "sweep": (bench_sweep, "--cases 2 --workers 1 --until 1"),
     "vision": (bench_vision, "--rounds 1"),
 }
 
