@@ -185,7 +185,7 @@ def compare(report: Report, options: argparse.Namespace) -> None:
                 "not found": f"{len(cases) - found.size} of {len(cases)}",
             }
         )
-    report.table(f"{robot.name}, {len(cases)} poses", rows)
+    report.table(f"{len(cases)} poses of {robot.name}", rows)
     for name in list(ways)[1:]:
         least = AT_LEAST if name.startswith("MoorPy") else None
         report.ratio(f"{name} / ours", ratio(times[name], times["ours"]), at_least=least)

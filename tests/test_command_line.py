@@ -511,7 +511,7 @@ def test_compiling_is_announced_if_it_happens(
     with kernels.compilation_announced():
         time.sleep(0.35)
     err = capsys.readouterr().err
-    assert err.count("compiling the kernels, once") == misses
+    assert err.count("compiling kernels on their first use") == misses
 
 
 @pytest.mark.needs("numba")

@@ -60,7 +60,7 @@ def _columns(found: Calibration) -> list[Column]:
     return [
         Column(heading=("", "parameters"), cells=[g.name for g in groups], to_the_left=True),
         Column(heading=("", "unit"), cells=[g.unit for g in groups], to_the_left=True),
-        Column(heading=("error", "rms"), cells=[_digits(g.rms_error) for g in groups]),
+        Column(heading=("rms error", "per axis"), cells=[_digits(g.rms_error) for g in groups]),
         Column(heading=("predicted", "1 sigma"), cells=[_digits(g.rms_sigma) for g in groups]),
         Column(
             heading=("largest", "error"),

@@ -34,7 +34,7 @@ def compilation_announced() -> Iterator[None]:
     def watch() -> None:
         while not finished.wait(0.1):
             if any(sum(kernel.stats.cache_misses.values()) for kernel in _kernels()):
-                say("compiling the kernels, once; this takes up to a minute ...")
+                say("compiling kernels on their first use; this takes up to a minute ...")
                 return
 
     thread = threading.Thread(target=watch, daemon=True)

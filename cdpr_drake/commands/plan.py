@@ -74,7 +74,10 @@ def plan(options: argparse.Namespace) -> tuple[str, list[Setup]]:
         setups.append(Setup(robot=robot, controller="JSC", **values))
     is_test = number is not None and options.start is None and options.goal is None
     name = f"test-{number}" if is_test else re.sub(r"[^\w.-]+", "-", robot.name).strip(".-")
-    return name or "run", setups
+    # Runs that see or believe otherwise do not replace the plain one's results.
+    seen = "" if options.sensors == Setup.sensors else f"-{options.sensors}"
+    believed = "" if options.calibrated is None else "-calibrated"
+    return f"{name or 'run'}{seen}{believed}", setups
 
 
 def _believed(name: str, robot: CableRobot) -> CableRobot:
@@ -115,7 +118,8 @@ def describe(name: str, setup: Setup) -> str:
     """
     s = pose_error(setup.start, setup.goal, setup.robot.cameras.X_PM)
     turn, way = np.degrees(np.linalg.norm(s[:3])), np.linalg.norm(s[3:])
-    what = f"Test {name[5:]} of the paper" if name.startswith("test-") else "A move"
+    test = re.match(r"test-(\d+)", name)
+    what = f"Test {test[1]} of the paper" if test else "A move"
     loop = "a continuous loop"
     if setup.sample_time is not None:
         loop = f"{1.0 / setup.sample_time:g} Hz with {1e3 * setup.latency:g} ms of latency"

@@ -244,8 +244,8 @@ def _text(results: Mapping[str, Result], visions: dict[str, dict[str, Any]]) -> 
     means = float(np.abs(visions["mean"]["position"]).max())
     alone = float(np.linalg.norm(visions["independent"]["position"], axis=2).max())
     return (
-        "The paper's table lost its rows in our copy; its text gives the four numbers that ours "
-        "are compared with. All errors are true ones, those of E in F_b, as a laser tracker "
+        "The paper's table lost its rows in the copy at hand; its text gives the four numbers that "
+        "ours are compared with. All errors are true ones, those of E in F_b, as a laser tracker "
         "measures them.",
         "Joint space control: the winches' integral action leaves no error of the motors, so that "
         "the end is the rest of the elastic catenaries on the lengths that the inverse kinematics "

@@ -205,7 +205,7 @@ def _errors_table(results: Mapping[str, Result], pairs: Sequence[Result]) -> Tab
         note=(
             f"Over the last {LAST:g} s. Real robot: {len(pairs)} runs with noise and calibration "
             "errors; simulator: one with perfect measurements, which has only the rest of the "
-            "exponential left. The row of the simulator with SLSM is not in our copy of the paper."
+            "exponential left. The row of the simulator with SLSM is not in the copy at hand."
         ),
     )
 
@@ -232,7 +232,7 @@ def _times_table(results: Mapping[str, Result], pairs: Sequence[Result]) -> Tabl
         note=(
             f"To 2 % of the first error, noise aside; pairs of runs with the same noise and "
             f"calibration. The paper's column has two more numbers, {others} s, whose rows are "
-            "lost in our copy; one of them must be the simulator's."
+            "lost in the copy at hand; one of them must be the simulator's."
         ),
     )
 
