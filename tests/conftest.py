@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import os
 import shutil
+import signal
 import subprocess
 from collections.abc import Callable
 from functools import cache
@@ -28,6 +29,11 @@ def _runs(*command: str) -> bool:
         return subprocess.run(command, capture_output=True, timeout=60).returncode == 0
     except (OSError, subprocess.TimeoutExpired):
         return False
+
+
+def heed_interrupts() -> None:
+    """Make a child process end at Ctrl-C, for one that a background job starts ignores it."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 @cache

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from conftest import heed_interrupts
 
 from cdpr_drake.__main__ import main
 from cdpr_drake.commands import kernels
@@ -601,7 +602,7 @@ def test_what_is_compiled_ahead_is_all_that_a_run_needs(here: Path) -> None:
 def test_an_interrupt_ends_it_cleanly(here: Path) -> None:
     process = subprocess.Popen(
         [sys.executable, "-m", "cdpr_drake", "run", "--until", "100000"],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heed_interrupts,
     )  # fmt: skip
     assert process.stdout is not None
     assert process.stdout.readline().startswith("Test 4")  # all is prepared

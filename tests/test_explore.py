@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import find_chromium
+from conftest import find_chromium, heed_interrupts
 
 from cdpr_drake.__main__ import main
 from cdpr_drake.commands import explore
@@ -337,7 +337,8 @@ def test_the_command_follows_a_scripted_slider(
 def test_control_c_ends_it_cleanly(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "cdpr_drake", "explore"]
     process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path,
+        preexec_fn=heed_interrupts,
     )  # fmt: skip
     assert process.stdout is not None
     try:

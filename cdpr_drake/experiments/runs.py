@@ -365,8 +365,8 @@ def _check_path(setup: Setup, reference: Any) -> None:
     """Ask joint space control for motor angles at points of equal steps from start to goal."""
     context = reference.CreateDefaultContext()
     port = reference.GetOutputPort("desired_pose")
-    left = np.append(np.linspace(1.0, 0.02, 50), math.exp(-setup.gain * setup.until))
-    times = np.clip(-np.log(left) / setup.gain, 0.0, setup.until)
+    times = np.append(-np.log(np.linspace(1.0, 0.02, 50)) / setup.gain, setup.until)
+    times = np.clip(times, 0.0, setup.until)
     poses = []
     for time in times:
         context.SetTime(time)
