@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -20,7 +21,7 @@ from cdpr_drake.experiments.reproduction.section import Claim, Result, Section, 
 from cdpr_drake.experiments.reproduction.table7_variations import SOFT, variations
 from cdpr_drake.model.rotations import Array
 
-FRACTIONS = (0.5, 1.0 / np.e, 0.1, 0.02)
+FRACTIONS = (0.5, 1.0 / math.e, 0.1, 0.02)
 """Of the way that is left when a run counts as arrived, to compare models by."""
 
 WITHIN = 1.5
