@@ -605,10 +605,14 @@ def test_an_interrupt_ends_it_cleanly(here: Path) -> None:
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heed_interrupts,
     )  # fmt: skip
     assert process.stdout is not None
-    assert process.stdout.readline().startswith("Test 4")  # all is prepared
-    time.sleep(0.5)
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
+    try:
+        assert process.stdout.readline().startswith("Test 4")  # all is prepared
+        time.sleep(0.5)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    finally:
+        process.kill()
+        process.wait()
     assert process.returncode == 130
     assert err.splitlines()[-1] == "cdpr-drake: interrupted, nothing written"
     assert "Traceback" not in err + out
