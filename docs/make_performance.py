@@ -24,7 +24,7 @@ from cdpr_drake.show.style import REFERENCE, RUN_COLOURS  # noqa: E402
 PAGE = ROOT / "docs" / "performance.md"
 PICTURE = ROOT / "docs" / "images" / "performance.png"
 
-ORDER = ("peers_loop", "peers_cable", "peers_equilibrium", "peers_linearize", "scale")
+ORDER = ("peers_loop", "peers_cable", "peers_equilibrium", "peers_linearize", "scale", "sweep")
 
 INTRODUCTION = """\
 # Performance
