@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-import time
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -13,7 +12,7 @@ from cdpr_drake.commands.answer import leave, wrapped
 from cdpr_drake.commands.arguments import UsageError
 from cdpr_drake.commands.kernels import compilation_announced
 from cdpr_drake.commands.place import as_file_name
-from cdpr_drake.commands.terminal import REDRAW_PERIOD, Column, fitting, table, width_of
+from cdpr_drake.commands.terminal import CaseProgress, Column, fitting, table, width_of
 from cdpr_drake.errors import CdprError
 from cdpr_drake.experiments.ablation import METRICS, Ablation, Statistic, Worth, ablate
 
@@ -40,6 +39,7 @@ def ablate_command(options: argparse.Namespace) -> int:
     """
     _check(options)
     robots = list(dict.fromkeys(options.robot or ROBOTS))
+    progress = CaseProgress()
     try:
         with compilation_announced():
             found = ablate(
@@ -48,10 +48,11 @@ def ablate_command(options: argparse.Namespace) -> int:
                 gain=options.gain,
                 unknown_payload=options.unknown_payload,
                 jobs=options.jobs,
-                progress=_Count(),
+                progress=progress,
             )
     except (CdprError, ValueError) as error:
         raise UsageError(str(error)) from error
+    progress.done()
 
     def figures() -> dict[str, Any]:
         from cdpr_drake.show import ablation_figure
@@ -75,24 +76,6 @@ def _check(options: argparse.Namespace) -> None:
         raise UsageError(f"--gain: must be positive and finite, got {gain:g}/s")
     if not (math.isfinite(payload) and payload >= 0.0):
         raise UsageError(f"--unknown-payload: must be >= 0 and finite, got {payload:g} kg")
-
-
-class _Count:
-    """The count of runs on stderr: rewritten on a terminal, one line at the end else."""
-
-    def __init__(self) -> None:
-        self._begun = time.monotonic()
-        self._drawn = self._begun - REDRAW_PERIOD
-
-    def __call__(self, done: int, total: int) -> None:
-        """Show that `done` of a `total` are done."""
-        now = time.monotonic()
-        on_terminal, is_last = sys.stderr.isatty(), done == total
-        if is_last or (on_terminal and now - self._drawn >= REDRAW_PERIOD):
-            self._drawn = now
-            start, end = "\r" if on_terminal else "", "\n" if is_last else ""
-            took = f" in {now - self._begun:.0f} s" if is_last else ""
-            print(f"{start}{done} of {total} runs{took}", end=end, file=sys.stderr, flush=True)
 
 
 def _lines(found: Sequence[Ablation]) -> Iterator[str]:

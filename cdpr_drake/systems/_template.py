@@ -105,3 +105,16 @@ def optional_input(port: Any, context: Any, size: int) -> np.ndarray:
         size: the port's size.
     """
     return port.Eval(context) if port.HasValue(context) else np.zeros(size)
+
+
+def part_of_state(part: slice) -> Callable[[Any, Any], None]:
+    """Return what calculates an output port that shows a part of the discrete state.
+
+    Args:
+        part: of the state vector.
+    """
+
+    def calc(context: Any, output: Any) -> None:
+        output.SetFromVector(context.get_discrete_state_vector().CopyToVector()[part])
+
+    return calc

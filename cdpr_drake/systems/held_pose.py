@@ -11,6 +11,7 @@ from pydrake.systems.framework import LeafSystem
 from cdpr_drake.errors import GeometryError, SimulationError
 from cdpr_drake.model.rotations import Array, pose_to_vector, vector_to_pose
 from cdpr_drake.model.vision.pose import PoseEstimate
+from cdpr_drake.systems._template import part_of_state
 
 # The discrete state: pose, covariance, and what is counted.
 _POSE, _COVARIANCE = slice(0, 6), slice(6, 42)
@@ -65,7 +66,7 @@ class HeldPose(LeafSystem):
             ("images_lost", slice(_IMAGES_LOST, _IMAGES_LOST + 1)),
         ):
             size = part.stop - part.start
-            self.DeclareVectorOutputPort(name, size, self._part(part), {self.xd_ticket()})
+            self.DeclareVectorOutputPort(name, size, part_of_state(part), {self.xd_ticket()})
 
     def measure(self, context: Any, prior: RigidTransform | None) -> PoseEstimate | None:
         """Return the pose that the inputs show now, or None where they show too little.
@@ -124,12 +125,6 @@ class HeldPose(LeafSystem):
             state[_LOST] += 1.0
         state[_IMAGES_LOST] += self.num_cameras - state[_CAMERAS]
         discrete.set_value(state)
-
-    def _part(self, part: slice) -> Any:
-        def calc(context: Any, output: Any) -> None:
-            output.SetFromVector(context.get_discrete_state_vector().CopyToVector()[part])
-
-        return calc
 
 
 def _record(state: Array, estimate: PoseEstimate) -> None:

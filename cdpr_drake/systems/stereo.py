@@ -13,7 +13,7 @@ from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, vector_to_pose
 from cdpr_drake.model.vision.outages import STEREO_PAIR, Outage, Outages
 from cdpr_drake.model.vision.tangents import CableImages, TangentEstimate, TangentEstimator
-from cdpr_drake.systems._template import GAUSSIAN_INPUT, check_finite
+from cdpr_drake.systems._template import GAUSSIAN_INPUT, check_finite, part_of_state
 
 
 class StereoCameras(LeafSystem):
@@ -64,7 +64,7 @@ class StereoCameras(LeafSystem):
             ("curvature_bias", k),
             ("frames_lost", k),
         ):
-            part = self._part(slice(start, start + size))
+            part = part_of_state(slice(start, start + size))
             self.DeclareVectorOutputPort(name, size, part, {self.xd_ticket()})
             start += size
 
@@ -129,12 +129,6 @@ class StereoCameras(LeafSystem):
         bias = np.where(valid, estimate.curvature_bias, bias)
         lost = state[5 * k :] + ~valid
         return np.concatenate([tangents.ravel(), valid, bias, lost])
-
-    def _part(self, part: slice) -> Any:
-        def calc(context: Any, output: Any) -> None:
-            output.SetFromVector(context.get_discrete_state_vector().CopyToVector()[part])
-
-        return calc
 
 
 class StereoTangentCameras(StereoCameras):
