@@ -28,6 +28,8 @@ class FusedPlant(LeafSystem):
         - external_wrench (optional)
         - noise (optional)
         output_ports:
+        - state
+        - packed
         - pose
         - platform_state
         - tension_at_winch
@@ -45,7 +47,8 @@ class FusedPlant(LeafSystem):
 
     The same equations as `make_cable_robot`, `LoadCellFilter` and `MotorAngleIntegrator` wired
     together, by the same kernels (kernels/plant.py): the framework is passed through once for a
-    derivative, not ten times. Ports are as there; noise (k) is the load cells'. State: [platform
+    derivative, not ten times. Ports are as there; noise (k) is the load cells', packed
+    that of `CatenaryCableForce`. State: [platform
     (12); motor angles (k); rates (k); integrals (k); filters (n_f k); desired angles (k)]. For
     floats only: to linearise, take the blocks.
 
