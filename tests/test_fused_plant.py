@@ -138,6 +138,13 @@ def test_all_outputs_follow_from_the_state(cogiro: CableRobot) -> None:
     assert robot_of(make_vision_based_control(cogiro, fused=True)) is cogiro
 
 
+def test_the_docstring_names_all_ports(cogiro: CableRobot) -> None:
+    plant = FusedPlant(cogiro)
+    block = (FusedPlant.__doc__ or "").partition("output_ports:")[2].partition("\n\n")[0]
+    ports = [plant.get_output_port(i).get_name() for i in range(plant.num_output_ports())]
+    assert [line.strip("- ") for line in block.split("\n") if line.strip()] == ports
+
+
 def test_what_cannot_be_fused_is_said(cogiro: CableRobot) -> None:
     cells = cogiro.load_cells.replace(vibration_amplitude=20.0)
     with pytest.raises(ValueError, match="vibrate"):

@@ -32,25 +32,26 @@ class FusedPlant(LeafSystem):
         - packed
         - pose
         - platform_state
-        - tension_at_winch
+        - motor_angles
+        - motor_rates
+        - measured_tension
+        - desired_motor_angles
+        - platform_wrench
         - tension_at_drawing_point
         - tension_at_attachment_point
         - tangents_at_drawing_point
         - tangents_at_attachment_point
         - dbeta
         - unstrained_length
-        - motor_angles
-        - motor_rates
         - motor_torques
-        - measured_tension
-        - desired_motor_angles
+        - tension_at_winch
 
     The same equations as `make_cable_robot`, `LoadCellFilter` and `MotorAngleIntegrator` wired
     together, by the same kernels (kernels/plant.py): the framework is passed through once for a
-    derivative, not ten times. Ports are as there; noise (k) is the load cells', packed
-    that of `CatenaryCableForce`. State: [platform
-    (12); motor angles (k); rates (k); integrals (k); filters (n_f k); desired angles (k)]. For
-    floats only: to linearise, take the blocks.
+    derivative, not ten times. Ports are as there, packed as in `CatenaryCableForce`; noise (k) is
+    the load cells'. State, and the port of that name: [platform (12); motor angles (k); rates (k);
+    integrals (k); filters (n_f k); desired angles (k)]. For floats only: to linearise, take the
+    blocks.
 
     Args:
         robot: the true robot; its load cells do not vibrate.
