@@ -56,7 +56,9 @@ def solve_all(rows, strains, run, softening, offset, found):
         length = rows[i, 2] + run / (1.0 + strains[i])
         L = math.sqrt(Bx * Bx + Bz * Bz)
         soft = softening * EA * offset
-        H, V_B, l0, iterations, failed = _solve(Bx, Bz, L, length, run, w, EA, soft, offset)
+        H, V_B, l0, iterations, failed, _near, _linear = _solve(
+            Bx, Bz, L, length, run, w, EA, soft, offset
+        )
         at = _linearise(H, V_B, l0, length, run, w, EA, soft, offset)
         found[i, 0] = 1.0 if failed or not H > 0.0 else 0.0
         found[i, 1] = iterations

@@ -84,7 +84,10 @@ class Simulation:
     # --- the plant
 
     def catenaries(self, Bx: Array, Bz: Array, length: Array) -> tuple[Array, ...]:
-        """Return (H, V_A, V_B, T_A, T_B), by Newton's method from where it ended last."""
+        """Return (H, V_A, V_B, T_A, T_B), by Newton's method from where it ended last, and how the
+        cables stretch with Bx, Bz and their lengths, (3, k): as Hooke's law has it for the tension
+        in the middle of the span.
+        """
         w, EA = self.w, self.EA
         H, V_A = self._force
         for _ in range(50):
@@ -114,8 +117,17 @@ class Simulation:
             raise ArithmeticError("a cable has no catenary")
         self._force = np.array([H, V_A])
         T_A = np.sqrt(H * H + V_A * V_A)
-        V_B = V_A + w * (length - self.drum_run / (1.0 + T_A / EA))
-        return H, V_A, V_B, T_A, np.sqrt(H * H + V_B * V_B)
+        l0 = length - self.drum_run / (1.0 + T_A / EA)
+        V_B = V_A + w * l0
+        V_m = V_A + 0.5 * w * l0
+        T_m = np.sqrt(H * H + V_m * V_m)
+        by_H = (H + 0.5 * w * V_m * slack * cA) / T_m
+        by_V = V_m * (1.0 + 0.5 * w * slack * sA) / T_m
+        e_x = (by_H * zV - by_V * zH) / det
+        e_z = (by_V * xH - by_H * xV) / det
+        e_l = 0.5 * w * V_m / T_m - e_x * by_l0[0] - e_z * by_l0[1]
+        stretch = length / EA * np.array([e_x, e_z, e_l])
+        return H, V_A, V_B, T_A, np.sqrt(H * H + V_B * V_B), stretch
 
     def cables(self, y: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
         """Return R, EB (k, 3), forces on the platform (k, 3), T_A; H and V_A without damping."""
@@ -125,14 +137,16 @@ class Simulation:
         AB = EB + y[4:7] - self.A
         length = self.winch.encoder_zero_length + r * y[13 : 13 + k]
         Bx = np.sqrt(AB[:, 0] ** 2 + AB[:, 1] ** 2)
-        H, V_A, V_B, T_A, T_B = self.catenaries(Bx, AB[:, 2], length)
+        H, V_A, V_B, T_A, T_B, stretch = self.catenaries(Bx, AB[:, 2], length)
         velocity = y[10:13] + EB @ cross_matrix(y[7:10]).T
-        L = np.sqrt(Bx * Bx + AB[:, 2] ** 2)
-        stretching = np.einsum("ij,ij->i", AB, velocity) / L - r * y[13 + k : 13 + 2 * k]
-        T_d = np.maximum(self.damping * stretching / length, -np.minimum(T_A, T_B))
-        part = -(1.0 + T_d / T_B)
-        horizontal = (part * H / Bx)[:, None] * AB[:, :2]
-        return R, EB, np.column_stack([horizontal, part * V_B]), T_A + T_d, H, V_A
+        e_x, e_z, e_l = stretch
+        e_B = np.column_stack([(e_x / Bx)[:, None] * AB[:, :2], e_z])
+        forces = np.column_stack([(-H / Bx)[:, None] * AB[:, :2], -V_B])
+        e_t = -np.einsum("ij,ij->i", e_B, forces) / T_B
+        stretching = np.einsum("ij,ij->i", e_B, velocity) + e_l * r * y[13 + k : 13 + 2 * k]
+        # Neither end pushes: e_l < 0 < e_t as long as the cables are not slack.
+        T_d = np.maximum(self.damping * stretching / length, -np.minimum(-T_A / e_l, T_B / e_t))
+        return R, EB, forces - T_d[:, None] * e_B, T_A - e_l * T_d, H, V_A
 
     def derivatives(self, _t: float, y: Array, rates: Array, noise: Array) -> Array:
         """Return dy/dt with held motor rates [rad/s] and the load cells' noise."""

@@ -13,7 +13,7 @@ from test_systems import START, usual_inputs
 from cdpr_drake.errors import CableError, SimulationError
 from cdpr_drake.model.catenary import elastic_catenary
 from cdpr_drake.model.equilibrium import rest_state
-from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.rotations import pose_to_vector
 from cdpr_drake.systems import CatenaryCableForce
 
@@ -56,10 +56,14 @@ def test_weightless_cables_are_springs_and_dampers(cogiro: CableRobot) -> None:
     length, rate = np.array([6.9, 6.6]), np.array([0.05, -0.02])
     system = CatenaryCableForce(robot)
     values = evaluate(system, fixed_context(system, inputs(state, length, rate)))
-    # Run and span bear the same tension, EA ((L + R) / l - 1), and EA t_d (dL/dt - dl/dt) / l.
-    stretching = u @ np.array([0.2, 0.0, -0.1]) - rate
-    T = 1e5 * ((L + RUN) / length - 1.0 + 0.01 * stretching / length)
-    np.testing.assert_allclose(values["tension_at_drawing_point"], T, rtol=1e-9)
+    # Run and span bear the same tension, EA ((L + R) / l - 1), and the rate of that by t_d. What
+    # the winch pays out stretches: its end feels it by as much more.
+    longer = (L + RUN) / length
+    stretching = u @ np.array([0.2, 0.0, -0.1]) - longer * rate
+    T_d = 1e5 * 0.01 * stretching / length
+    T = 1e5 * (longer - 1.0) + T_d
+    T_A = 1e5 * (longer - 1.0) + longer * T_d
+    np.testing.assert_allclose(values["tension_at_drawing_point"], T_A, rtol=1e-9)
     np.testing.assert_allclose(values["tension_at_attachment_point"], T, rtol=1e-9)
     force = -T[:, None] * u
     arms = np.array([[0.0, 0.0, 1.0], [0.5, 0.0, 1.0]])
@@ -114,23 +118,28 @@ def expected_parts(values: dict[str, np.ndarray]) -> list[np.ndarray]:
     return [values[name] for name in names]
 
 
-def test_structural_damping_takes_energy_out(cogiro: CableRobot) -> None:
-    """A cable that gets longer, or is reeled in, pulls harder than at rest, by EA t_d per rate."""
-    X = RigidTransform([0.2, -0.1, 1.0])
-    length = rest_state(cogiro, X).unstrained_length
-    system = CatenaryCableForce(cogiro)
-
-    def tensions(v: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        state = np.concatenate([pose_to_vector(X), np.zeros(3), v])
-        values = evaluate(system, fixed_context(system, inputs(state, length, rate)))
-        return values["tension_at_drawing_point"], values["tension_at_attachment_point"]
-
-    still = tensions(np.zeros(3), np.zeros(8))
-    for v, rate in ((np.array([0.0, 0.0, -0.1]), np.zeros(8)), (np.zeros(3), np.full(8, -0.1))):
-        moving = tensions(v, rate)
-        assert np.all(moving[0] > still[0])
-        # Both ends gain the same.
-        np.testing.assert_allclose(moving[0] - still[0], moving[1] - still[1], rtol=1e-9)
+@pytest.mark.parametrize("name", ["cogiro", "cogiro-37m", "cogiro-98m"])
+def test_structural_damping_takes_energy_out(name: str) -> None:
+    """Of any motion of the platform and the winches together, on small and large robots."""
+    robot = load_robot(name)
+    generator = np.random.default_rng(3)
+    span = np.ptp(robot.drawing_points, axis=0)
+    height = robot.drawing_points[:, 2].max()
+    for _ in range(50):
+        X = RigidTransform([*(0.1 * generator.normal(size=2) * span[:2]), 0.25 * height])
+        length = rest_state(robot, X).unstrained_length
+        v, rate = 0.1 * generator.normal(size=6), 0.1 * generator.normal(size=8)
+        state = np.concatenate([pose_to_vector(X), v])
+        found = []
+        for damping_time in (0.0, robot.cable.damping_time):
+            system = CatenaryCableForce(
+                robot.replace(cable=robot.cable.replace(damping_time=damping_time))
+            )
+            found.append(evaluate(system, fixed_context(system, inputs(state, length, rate))))
+        still, moving = found
+        wrench = moving["platform_wrench"] - still["platform_wrench"]
+        pull = moving["tension_at_drawing_point"] - still["tension_at_drawing_point"]
+        assert wrench @ v + pull @ rate < 0.0
 
 
 # --- derivatives

@@ -19,7 +19,7 @@ from cdpr_drake.diagrams import (
     with_reference,
 )
 from cdpr_drake.experiments.paper_tests import paper_test
-from cdpr_drake.model.catenary import cable_energy
+from cdpr_drake.model.catenary import cable_energy, elastic_catenary
 from cdpr_drake.model.kernels import is_compiled
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import pose_to_vector, vector_to_pose
@@ -114,7 +114,6 @@ class Powers(LeafSystem):
         "platform_state",
         "tension_at_winch",
         "tension_at_drawing_point",
-        "tangents_at_attachment_point",
         "unstrained_length",
     )
 
@@ -127,33 +126,51 @@ class Powers(LeafSystem):
 
     def calc(self, context: Context, output: Any) -> None:
         robot, winch, cable = self.robot, self.robot.winch, self.robot.cable
-        torque, q_rate, state, T_W, T_A, tangents, length = (
+        torque, q_rate, state, T_W, T_A, length = (
             self.GetInputPort(name).Eval(context) for name in self.PORTS
         )
         X_WP, omega, v = vector_to_pose(state[:6]), state[6:9], state[9:]
         EB = robot.attachment_points @ X_WP.rotation().matrix().T
         AB = EB + X_WP.translation() - robot.drawing_points
         v_B = v + np.cross(omega, EB)
-        u = AB / np.linalg.norm(AB, axis=1)[:, None]
         l_rate = winch.transmission * q_rate
         EA = cable.stiffness.asymptote
-        # Both ends' tension has EA t_d (dL/dt - dl/dt) / l of damping; it acts along the tangent at
-        # B, and at A on the winch.
-        damping = EA * cable.damping_time * (np.sum(u * v_B, axis=1) - l_rate) / length
-        along = np.sum(tangents.reshape(-1, 3) * v_B, axis=1)
+        e_B, e_l = stretch_gradient(robot, AB, length)
+        speed = np.sum(e_B * v_B, axis=1) + e_l * l_rate
+        damping = EA * cable.damping_time / length * speed
         # A metre on the drum keeps its strain energy; l = l(0) + r q has the drum take up
         # unstrained length.
-        strain = (T_A - damping) ** 2 / (2.0 * EA)
+        strain = (T_A + e_l * damping) ** 2 / (2.0 * EA)
         powers = [
             torque @ q_rate,
             -winch.damping * q_rate @ q_rate,
             -winch.coulomb_torque * np.tanh(q_rate / winch.coulomb_rate) @ q_rate,
             (T_W - T_A) @ l_rate,
-            damping @ (l_rate - along),
+            -damping @ speed,
             -strain @ l_rate,
             self.wrench @ state[6:],
         ]
         output.SetFromVector(powers)
+
+
+def stretch_gradient(
+    robot: CableRobot, AB: np.ndarray, length: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return how much cables stretch with the place of B (k, 3) and with their length (k,).
+
+    By differences: l / EA times the change of the tension in the middle of the span.
+    """
+    cable = robot.cable
+    w, EA = robot.weight_per_metre, cable.stiffness.asymptote
+
+    def stretch(AB: np.ndarray, more: float) -> np.ndarray:
+        at = elastic_catenary(AB, length + more, w, cable.stiffness, cable.drum_run)
+        V = -at.force_on_platform[:, 2] - 0.5 * w * at.unstrained_span_length
+        return length / EA * np.hypot(at.horizontal_tension, V)
+
+    h = 1e-5
+    by_place = [(stretch(AB + d, 0.0) - stretch(AB - d, 0.0)) / (2 * h) for d in h * np.eye(3)]
+    return np.column_stack(by_place), (stretch(AB, h) - stretch(AB, -h)) / (2 * h)
 
 
 def energy(robot: CableRobot, diagram: Diagram, context: Context) -> dict[str, float]:

@@ -94,7 +94,8 @@ class Cable(Record):
         diameter: [m].
         section: metallic cross-section [m2].
         stiffness: AxialStiffness; a number [N] stands for a constant EA.
-        damping_time: [s], axial damping is EA * damping_time per unit of strain rate.
+        damping_time: [s], axial damping is EA * damping_time per unit of strain rate; what the sag
+            gives way is no strain.
         drum_run: (k,) [m], geometric length from the drum to the drawing point; a number stands
             for all cables.
         min_tension: [N], the lowest a tension distribution may ask for.

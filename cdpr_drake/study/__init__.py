@@ -30,11 +30,13 @@ from cdpr_drake.study.response import (
 )
 from cdpr_drake.study.sampled import OnePeriodMap, one_period_map, simulated_period_map
 from cdpr_drake.study.stability import (
+    GainBand,
     GainLimit,
     SampledServo,
     StabilityMap,
     StabilityWarning,
     gain_limit,
+    gain_limit_band,
     stability_map,
     warn_if_unstable,
 )
@@ -44,6 +46,7 @@ from cdpr_drake.study.sweep import Outcome, Sweep, sweep
 
 __all__ = [
     "Comparison",
+    "GainBand",
     "GainLimit",
     "GainMap",
     "GainMatrix",
@@ -72,6 +75,7 @@ __all__ = [
     "excursion",
     "explore_pose",
     "gain_limit",
+    "gain_limit_band",
     "gain_matrix",
     "initial_response",
     "internal_tension",

@@ -33,6 +33,14 @@ LOWEST_GAIN = 1e-3
 """Where the search for a gain limit begins [1/s]."""
 
 
+LOSS_FACTORS = (0.01, 0.1)
+"""Range of the loss factor of wire rope in tension [-]: judgement, for no value of this rope is
+published, and that of strands hangs on load and amplitude (Hobbs and Raoof, Behaviour of cables
+under dynamic or repeated loading, J. Constr. Steel Research 39, 1996). A mode that is all stretch
+is damped by half of it, 0.5 to 5 %.
+"""
+
+
 class StabilityWarning(UserWarning):
     """A loop is predicted to be unstable."""
 
@@ -48,6 +56,8 @@ class SampledServo:
         cable_model: the law's "ECM", "CMWE", "SCMWE" or "SLSM".
         tensions: "minimum norm" (of the chord tensions), or "within limits".
         settings: the law's other settings (order, model_drum_run).
+        drag: [1/s], a wrench of -drag times the platform's momentum, for what damps it besides the
+            stretch of the cables.
 
     Raises:
         GeometryError, TensionError, EquilibriumError: the robot cannot rest there.
@@ -64,6 +74,7 @@ class SampledServo:
         cable_model: str = "SCMWE",
         tensions: str = "minimum norm",
         settings: ServoSettings | None = None,
+        drag: float = 0.0,
     ) -> None:
         check_sampling(0.0, sample_time, 0.0)
         ours = believed if believed is not None else robot
@@ -75,6 +86,7 @@ class SampledServo:
         self._size = n + 6
         self._A = np.zeros((n + 12, n + 12))  # with the held rates as constant states
         self._A[:n, :n] = A
+        self._A[6:12, 6:12] -= drag * np.eye(6)
         self._A[:n, n : n + 6] = B @ gamma.length_rates / robot.winch.transmission
         self._A[n : n + 6, n + 6 :] = np.eye(6)
         true = true_from_seen(robot, ours, gamma.pose)
@@ -205,7 +217,7 @@ def gain_limit(
         sample_time: T [s].
         highest: gain [1/s] to search up to; 0.99 / T if None.
         points: number of gains to scan, equally spaced in their logarithm.
-        law: believed, cable_model, tensions, settings, as for `SampledServo`.
+        law: believed, cable_model, tensions, settings, drag, as for `SampledServo`.
 
     Raises:
         GeometryError, TensionError, EquilibriumError: the robot cannot rest there.
@@ -263,6 +275,85 @@ def find_gain_limit(
     )
 
 
+@dataclass(frozen=True, kw_only=True)
+class GainBand:
+    """Gain limits over a range of the cables' damping.
+
+    Attributes:
+        loss_factors: (n,) of the cables in tension [-], at the frequency of each limit.
+        damping_times: (n,) [s] that give them there, eta / (2 pi f).
+        limits: (n,) gain limits.
+    """
+
+    loss_factors: tuple[float, ...]
+    damping_times: tuple[float, ...]
+    limits: tuple[GainLimit, ...]
+
+    @property
+    def lowest(self) -> float:
+        """The smallest of the limits [1/s]."""
+        return min(limit.gain for limit in self.limits)
+
+    @property
+    def highest(self) -> float:
+        """The largest of the limits [1/s]; infinite where none was found."""
+        return max(limit.gain for limit in self.limits)
+
+    def __str__(self) -> str:
+        factors = f"{min(self.loss_factors):g} to {max(self.loss_factors):g}"
+        times = f"{1e3 * min(self.damping_times):.2g} to {1e3 * max(self.damping_times):.2g} ms"
+        gains = f"{self.lowest:.3g} to {self.highest:.3g}/s"
+        return f"{gains} for loss factors of {factors} (damping times of {times})"
+
+
+def gain_limit_band(
+    robot: CableRobot,
+    pose: RigidTransform | ArrayLike,
+    latency: float = 0.04,
+    sample_time: float = 0.05,
+    *,
+    loss_factors: Iterable[float] = tuple(np.geomspace(*LOSS_FACTORS, 3)),
+    points: int = 60,
+    **law: Any,
+) -> GainBand:
+    """Return the gain limits at a pose over what the structural damping of cables may be.
+
+    A loss factor eta is a damping time of eta / (2 pi f) at the frequency f of the mode that goes
+    unstable. Only what a mode stretches the cables is damped so, not what it changes of their sag.
+
+    Args:
+        robot: the true robot, with its payload; its own damping time is not used.
+        pose: the goal where the controller sees it, X_WP or [roll, pitch, yaw, x, y, z] (rad, m).
+        latency: from image to change of the motor rates [s].
+        sample_time: T [s].
+        loss_factors: of the cables in tension [-], positive.
+        points: number of gains to scan for each limit.
+        law: as for `gain_limit`.
+
+    Raises:
+        GeometryError, TensionError, EquilibriumError: the robot cannot rest there.
+        ValueError: as `gain_limit`, or a loss factor that is not positive.
+    """
+    factors = tuple(map(float, loss_factors))
+    if not factors or min(factors) <= 0.0:
+        raise ValueError(f"loss factors must be positive, got {list(factors)}")
+    limits, times = [], []
+    frequency = 1.0
+    for factor in factors:
+        for _ in range(8):
+            time = factor / (2.0 * math.pi * frequency)
+            damped = robot.replace(cable=robot.cable.replace(damping_time=time))
+            limit = gain_limit(damped, pose, latency, sample_time, points=points, **law)
+            before, frequency = frequency, limit.frequency
+            if not frequency > 0.0:  # nothing oscillates, or all is stable
+                frequency = before
+            if abs(frequency - before) <= 0.01 * before:
+                break
+        limits.append(limit)
+        times.append(time)
+    return GainBand(loss_factors=factors, damping_times=tuple(times), limits=tuple(limits))
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StabilityMap:
     """Decay of the slowest mode over gain and latency.
@@ -304,7 +395,7 @@ def stability_map(
         gains: lambda [1/s], rising.
         latencies: [s].
         sample_time: T [s].
-        law: believed, cable_model, tensions, settings, as for `SampledServo`.
+        law: believed, cable_model, tensions, settings, drag, as for `SampledServo`.
 
     Raises:
         GeometryError, TensionError, EquilibriumError: the robot cannot rest there.

@@ -36,7 +36,15 @@ def CatenaryCableForce_(T: type) -> type:
 
         Each cable is the exact elastic catenary (Irvine, Cable Structures, 1981) between its
         drawing point A and attachment point B, in series with the run from drum to eyelet, which
-        stretches with it; both end tensions gain E A t_d (dL/dt - dl/dt) / l of structural damping.
+        stretches with it. Structural damping resists the rate s at which a cable stretches, as its
+        tension at rest has it, not its gain of chord, which may be loss of sag:
+
+            s = e_B . v_B + e_l dl/dt,   T_d = (E A t_d / l) s,
+            force on the platform - e_B T_d,   T_A - e_l T_d,
+
+        with the gradient e of the stretch (kernels/catenary.py), so that it takes out the power
+        T_d s >= 0. Where T_A, or T_B along the tangent, would become negative, T_d is held at what
+        makes it zero: no cable pushes. Slack cables are hardly damped.
 
         platform_state (12) is [roll, pitch, yaw, x, y, z, omega, v] of the platform in W, as the
         plant has it; unstrained_length (k) [m] includes the run; platform_wrench (6) is [torque;

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cdpr_drake.experiments.reproduction.assumptions import assumed, assumptions
+from cdpr_drake.experiments.reproduction.drag import run_with_drag
 from cdpr_drake.experiments.reproduction.large_robot import (
     GOAL,
     MODELS,
@@ -16,7 +17,6 @@ from cdpr_drake.experiments.reproduction.large_robot import (
 from cdpr_drake.experiments.reproduction.section import Case, Result
 from cdpr_drake.experiments.reproduction.table7_section import section
 from cdpr_drake.experiments.reproduction.table7_variations import slow_errors, variations, vary
-from cdpr_drake.experiments.runs import run
 from cdpr_drake.model.rotations import Array, as_pose
 from cdpr_drake.study.response import excursion
 
@@ -40,7 +40,9 @@ def cases() -> Sequence[Case]:
 
 
 def move(cable_model: str, ramp_time: float | None = None) -> Result:
-    """Simulate the 20 m move with all dynamics; n lines of a record every 0.25 s.
+    """Simulate the 20 m move with all dynamics, and with drag, without which it is unstable.
+
+    The record has n lines, every 0.25 s.
 
     The result holds time (n,) [s]; position_error (n, 3) [m], wanted minus true place of the target
     frame's origin in W; orientation_error (n, 3) [rad], the rotation vector s_w of the true error;
@@ -55,7 +57,7 @@ def move(cable_model: str, ramp_time: float | None = None) -> Result:
     if ramp_time is not None:
         values["ramp_time"] = ramp_time
     setup = setup_of_move(values, cable_model)
-    record = run(setup).record
+    record = run_with_drag(setup, values["drag"])
     X_PM = setup.robot.cameras.X_PM
     places = np.array([(as_pose(pose) @ X_PM).translation() for pose in record["pose"]])
     velocity = np.gradient(places, record.time, axis=0)

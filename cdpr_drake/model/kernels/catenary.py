@@ -15,6 +15,19 @@ part G of the flexibility d(Bx,Bz)/d(H,V_B) = (l0/EA) I + G has
 
     trace G = D/w = (2 l0/S)(1 + y^2 b)      det G = H^2/(T_A T_B) (2 l0/S)^2 y^2 b / (1 - y^2)
 
+Structural damping. A cable that gains chord by losing sag does not stretch. How fast it stretches
+follows from its tension at rest, T in the middle of the span, T^2 = H^2 + ((V_A + V_B)/2)^2, as
+Hooke's law has it for the whole length l, run included:
+
+    s = e_B . v_B + e_l dl/dt,      e = (l / EA_t) dT/d(p_WB, l),      EA_t = dT/d(T/EA(T)) at T_A
+    T_d = (EA t_d / l) s,           force on the platform - e_B T_d,   T_A - e_l T_d
+
+(Kelvin and Voigt's material: EA t_d per unit of strain rate.) Force and rate share the gradient e,
+so the power taken out is T_d s >= 0. A straight cable has e_B along itself and e_l = -(1 + T/EA);
+sag makes e smaller, by 1/(1 + lambda^2/12) with Irvine's lambda^2, and a slack cable damps hardly
+anything. T_d is cut back, keeping its sign, where it would turn the tension at A or that along the
+tangent at B negative.
+
 Arguments, float64 in SI units:
     Bx, Bz: B seen from A [m]; Bx > 0 horizontal, Bz up.
     l0: unstrained length of the span A-B [m].
@@ -26,7 +39,7 @@ Arguments, float64 in SI units:
         all in W.
     length, length_rate: (k,) total unstrained length [m], run included, and its rate [m/s].
     drum_run: (k,) geometric length of the run from the drum to A [m].
-    damping_time: [s], a rate of strain adds EA * damping_time times itself to the tension.
+    damping_time: [s], t_d below.
     out: (k, 14), jacobian: (k, 14, 8), C-contiguous, written.
 
 A status is 0, or 1 + the index of the cable that failed: a number that is not finite or out of
@@ -59,6 +72,17 @@ def secant_stiffness(T, asymptote, softening, offset):
         return asymptote, 0.0
     r = softening / (T + offset)
     return asymptote - r, r / (T + offset)
+
+
+@jit
+def _strain(T, asymptote, softening, offset):
+    """Return the first and second derivative [1/N, 1/N2] of the strain T/EA(T)."""
+    EA, dEA = secant_stiffness(T, asymptote, softening, offset)
+    soft = 1.0 / EA
+    bend = dEA * soft
+    if softening == 0.0:
+        return soft, 0.0
+    return soft * (1.0 - T * bend), 2.0 * bend * soft * (T / (T + offset) + T * bend - 1.0)
 
 
 @jit
@@ -250,12 +274,15 @@ def _guess(Bx, Bz, L, length, run, w, asymptote, softening, offset):
 
 @jit
 def _newton(Bx, Bz, L, length, run, w, asymptote, softening, offset, H, V_B, l0):
-    """Newton's method from a good guess. Return (H, V_B, l0, iterations); iterations > 40: failed.
+    """Newton's method from a good guess. Return (H, V_B, l0, iterations, near, linearisation);
+    iterations > 40: failed. The linearisation (Kxx, Kxz, Kzx, Kzz, mx, mz, mu, k) is of the last
+    round; near: that was at the solution, to 1e-11.
 
     It ends with a step below 1e-8 of the smallest tension: what is left is the square of that.
     Failing this (near-vertical cables determine a tiny H to about 1e-8 only), when the residual is
     round-off.
     """
+    linear = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for iteration in range(1, MAX_ITERATIONS + 1):
         x, z, r, Kxx, Kxz, Kzx, Kzz, mx, mz, mu, k, T_A, T_B, _EA, _dEA = _linearise(
             H, V_B, l0, length, run, w, asymptote, softening, offset
@@ -267,14 +294,17 @@ def _newton(Bx, Bz, L, length, run, w, asymptote, softening, offset, H, V_B, l0)
         dH = Kxx * ex + Kxz * ez
         dV = Kzx * ex + Kzz * ez
         dl = mu * r + k * (H * dH + (V_B - w * l0) * dV)
-        if abs(dH) <= 1e-8 * H and abs(dV) <= 1e-8 * min(T_A, T_B) and abs(dl) <= 1e-10 * l0:
-            return H + dH, V_B + dV, l0 + dl, iteration
+        linear = (Kxx, Kxz, Kzx, Kzz, mx, mz, mu, k)
+        least = 1e-8 * min(T_A, T_B)
+        if abs(dH) <= 1e-8 * H and abs(dV) <= least and abs(dl) <= 1e-10 * l0:
+            near = abs(dH) <= 1e-11 * H and abs(dV) <= 1e-3 * least
+            return H + dH, V_B + dV, l0 + dl, iteration, near, linear
         if iteration > 3 and abs(rz) <= 1e-15 * L and abs(r) <= 1e-15 * length:
             noise = abs(x) + Bx
             if 2.0 * w * l0 > T_A + T_B:
                 noise += (abs(V_B) + w * l0) * (H / w) * (1.0 / T_A + 1.0 / T_B)
             if abs(rx) <= 4e-16 * noise:
-                return H, V_B, l0, iteration
+                return H, V_B, l0, iteration, True, linear
         step = 1.0
         if dH < -0.9 * H:
             step = -0.9 * H / dH
@@ -283,7 +313,7 @@ def _newton(Bx, Bz, L, length, run, w, asymptote, softening, offset, H, V_B, l0)
         l0 = max(l0 + step * dl, 0.5 * (length - run))
         if not (H < 1e300 and abs(V_B) < 1e300):
             break
-    return H, V_B, l0, MAX_ITERATIONS + 1
+    return H, V_B, l0, MAX_ITERATIONS + 1, False, linear
 
 
 @jit
@@ -408,15 +438,17 @@ def _admissible(Bx, L, length, run, w, asymptote, softening, offset):
 
 @jit
 def _solve(Bx, Bz, L, length, run, w, asymptote, softening, offset):
-    """Solve an admissible cable. Return (H, V_B, l0, iterations, failed)."""
+    """Solve an admissible cable. Return (H, V_B, l0, iterations, failed, near, linearisation), the
+    last two as `_newton` does.
+    """
     H, V_B, l0 = _guess(Bx, Bz, L, length, run, w, asymptote, softening, offset)
-    H, V_B, l0, iterations = _newton(
+    H, V_B, l0, iterations, near, linear = _newton(
         Bx, Bz, L, length, run, w, asymptote, softening, offset, H, V_B, l0
     )
     if iterations <= MAX_ITERATIONS:
-        return H, V_B, l0, iterations, False
+        return H, V_B, l0, iterations, False, near, linear
     H, V_B, l0, more, failed = _bracket(Bx, Bz, L, length, run, w, asymptote, softening, offset)
-    return H, V_B, l0, iterations + more, failed
+    return H, V_B, l0, iterations + more, failed, False, linear
 
 
 @jit
@@ -427,7 +459,7 @@ def solve_catenary(Bx, Bz, l0, w, EA):
     L = math.sqrt(Bx * Bx + Bz * Bz)
     if not (_admissible(Bx, L, l0, 0.0, w, EA, 0.0, 0.0) and Bx > 0.0):
         return 0.0, 0.0, 0, 1
-    H, V_B, _l0, iterations, failed = _solve(
+    H, V_B, _l0, iterations, failed, _near, _linear = _solve(
         max(Bx, 1e-10 * L), Bz, L, l0, 0.0, max(w, MIN_WEIGHT), EA, 0.0, 0.0
     )
     return H, V_B, iterations, 1 if failed else 0
@@ -449,22 +481,58 @@ def _chord(i, p_WA, p_WB):
 
 
 @jit
-def _damping(i, dx, dy, Bz, L, v_WB, length, rate, damping_time, EA, lowest):
-    """Return (T_d, clipped, L'): tension EA t_d (L' - l')/l of the structural damping, not below
-    -lowest so that no cable pushes, and the rate of the chord.
-    """
-    vx = float(v_WB[i, 0])
-    vy = float(v_WB[i, 1])
-    chord_rate = (dx * vx + dy * vy + Bz * float(v_WB[i, 2])) / L
-    T_d = EA * damping_time * (chord_rate - rate) / length
-    if T_d < -lowest:
-        return -lowest, True, chord_rate
-    return T_d, False, chord_rate
+def _in_plane(H, V_A, linear):
+    """Return d(H, V_B, l0)/d(Bx), then /d(Bz), /d(length), from a linearisation at the solution."""
+    Kxx, Kxz, Kzx, Kzz, mx, mz, mu, k = linear
+    dH = -(Kxx * mx + Kxz * mz)
+    dV = -(Kzx * mx + Kzz * mz)
+    return (
+        (Kxx, Kzx, k * (H * Kxx + V_A * Kzx)),
+        (Kxz, Kzz, k * (H * Kxz + V_A * Kzz)),
+        (dH, dV, mu + k * (H * dH + V_A * dV)),
+    )
 
 
 @jit
-def _force(i, p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, damping_time, out):
-    """Write row i of `out`. Return (failed, H, V_B, Bx) for the Jacobian, Bx as clamped."""
+def _stretch(H, V_m, w, moves, flexibility):
+    """Return (e_x, e_z, e_l): how much a cable stretches with Bx, Bz [-] and its length [-].
+
+    moves: from `_in_plane`; flexibility: l / EA_t [m/N].
+    """
+    T = math.sqrt(H * H + V_m * V_m)
+    a = flexibility * H / T
+    b = flexibility * V_m / T
+    x, z, l = moves
+    return (
+        a * x[0] + b * (x[1] - 0.5 * w * x[2]),
+        a * z[0] + b * (z[1] - 0.5 * w * z[2]),
+        a * l[0] + b * (l[1] - 0.5 * w * l[2]),
+    )
+
+
+@jit
+def _damping(viscosity, speed, e_l, e_t, T_A, T_B):
+    """Return (T_d, cut): the damping tension viscosity * speed, cut back where T_A - e_l T_d or
+    T_B + e_t T_d would be negative; cut is 1 at A, 2 at B, 0 if nothing was cut.
+    """
+    T_d = viscosity * speed
+    cut = 0
+    if e_l * T_d > T_A:
+        T_d = T_A / e_l
+        cut = 1
+    if e_t * T_d < -T_B:
+        T_d = -T_B / e_t
+        cut = 2
+    return T_d, cut
+
+
+@jit
+def _force(
+    i, p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, damping_time, differs, out
+):
+    """Write row i of `out`. Return (failed, H, V_B, Bx as clamped, linearisation) for
+    `_differentiate`; the linearisation is at the solution if the cable is damped or `differs`.
+    """
     dx, dy, Bz, Bx, L = _chord(i, p_WA, p_WB)
     l = float(length[i])
     run = float(drum_run[i])
@@ -472,13 +540,17 @@ def _force(i, p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, dam
     asymptote = float(stiffness[0])
     softening = float(stiffness[1])
     offset = float(stiffness[2])
-    speed = abs(float(v_WB[i, 0])) + abs(float(v_WB[i, 1])) + abs(float(v_WB[i, 2])) + abs(rate)
-    moves = speed <= MAX_SPEED and 0.0 <= damping_time <= MAX_DAMPING_TIME
-    if not (moves and _admissible(Bx, L, l, run, w, asymptote, softening, offset)):
-        return True, 0.0, 0.0, Bx
+    vx = float(v_WB[i, 0])
+    vy = float(v_WB[i, 1])
+    vz = float(v_WB[i, 2])
+    speed = abs(vx) + abs(vy) + abs(vz) + abs(rate)
+    none = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    in_range = speed <= MAX_SPEED and 0.0 <= damping_time <= MAX_DAMPING_TIME
+    if not (in_range and _admissible(Bx, L, l, run, w, asymptote, softening, offset)):
+        return True, 0.0, 0.0, Bx, none
     w = max(w, MIN_WEIGHT)
     clamped = max(Bx, MIN_SLOPE * L)
-    H, V_B, l0, _iterations, failed = _solve(
+    H, V_B, l0, _iterations, failed, near, linear = _solve(
         clamped, Bz, L, l, run, w, asymptote, softening, offset
     )
     # H/Bx stays finite for a vertical cable: with it the horizontal force needs no direction.
@@ -490,15 +562,31 @@ def _force(i, p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, dam
     T_A = math.sqrt(h * h + V_A * V_A)
     T_B = math.sqrt(h * h + V_B * V_B)
     EA, _dEA = secant_stiffness(T_A, asymptote, softening, offset)
-    T_d, _clipped, _rate = _damping(
-        i, dx, dy, Bz, L, v_WB, l, rate, damping_time, EA, min(T_A, T_B)
-    )
-    scale = -(1.0 + T_d / T_B)
-    out[i, 0] = scale * hx
-    out[i, 1] = scale * hy
-    out[i, 2] = scale * V_B
-    out[i, 3] = T_A + T_d
-    out[i, 4] = T_B + T_d
+    T_d = 0.0
+    e_q = 0.0
+    e_z = 0.0
+    e_l = 0.0
+    e_t = 0.0
+    cut = 0
+    damped = damping_time > 0.0 and speed > 0.0
+    if (differs or damped) and not near:
+        _x, _z, _r, Kxx, Kxz, Kzx, Kzz, mx, mz, mu, k, _TA, _TB, _EA, _d = _linearise(
+            H, V_B, l0, l, run, w, asymptote, softening, offset
+        )
+        linear = (Kxx, Kxz, Kzx, Kzz, mx, mz, mu, k)
+    if damped:
+        flexibility, _bend = _strain(T_A, asymptote, softening, offset)
+        moves = _in_plane(H, V_A, linear)
+        e_x, e_z, e_l = _stretch(H, 0.5 * (V_A + V_B), w, moves, l * flexibility)
+        e_q = e_x / clamped
+        e_t = (e_q * h * Bx + e_z * V_B) / T_B
+        stretching = e_q * (dx * vx + dy * vy) + e_z * vz + e_l * rate
+        T_d, cut = _damping(EA * damping_time / l, stretching, e_l, e_t, T_A, T_B)
+    out[i, 0] = -(hx + T_d * e_q * dx)
+    out[i, 1] = -(hy + T_d * e_q * dy)
+    out[i, 2] = -(V_B + T_d * e_z)
+    out[i, 3] = 0.0 if cut == 1 else T_A - e_l * T_d
+    out[i, 4] = 0.0 if cut == 2 else T_B + e_t * T_d
     out[i, 5] = hx / T_A
     out[i, 6] = hy / T_A
     out[i, 7] = V_A / T_A
@@ -517,41 +605,120 @@ def _force(i, p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, dam
     out[i, 11] = math.atan2(cross, h * Bx + V_B * Bz)
     out[i, 12] = h
     out[i, 13] = l0
-    return failed or not math.isfinite(T_d + V_B + h + T_A), H, V_B, clamped
+    return failed or not math.isfinite(T_d + V_B + h + T_A), H, V_B, clamped, linear
 
 
 @jit
 def cable_forces(p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, damping_time, out):
     """Write the state of each cable into `out` (k, 14). Return 0, or 1 + the index that failed.
 
-    Columns: 0:3 force of the cable on the platform at B, in W [N]; 3 T_A, 4 T_B with damping [N];
-    5:8, 8:11 unit tangents at A and B, directed from A to B, in W; 11 angle at B from the chord to
-    the cable [rad]; 12 H without damping [N]; 13 unstrained length of the span [m].
+    Columns: 0:3 force of the cable on the platform at B, in W [N]; 3 T_A, 4 T_B with damping [N],
+    the latter along the tangent; 5:8, 8:11 unit tangents at A and B at rest, directed from A to B,
+    in W; 11 angle at B from the chord to the cable [rad]; 12 H without damping [N]; 13 unstrained
+    length of the span [m].
     """
     for i in range(len(length)):
-        failed, _H, _V_B, _Bx = _force(
-            i, p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, damping_time, out
-        )
+        failed, _H, _V_B, _Bx, _linear = _force(
+            i, p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, damping_time, False,
+            out,
+        )  # fmt: skip
         if failed:
             return i + 1
     return 0
 
 
 @jit
+def _curvature(H, V_B, l0, run, w, asymptote, softening, offset, moves, g):
+    """Return d2T/d(Bx, Bz, length)2 of the tension T in the middle of the span, as three rows.
+
+    g = dT/d(Bx, Bz, length). With the span's equations E(u, q) = 0 of u = (H, V_B, l0), which are
+    linear in q = (Bx, Bz, length), d2T/dq2 = M^T (d2T/du2 - sum g_i d2E_i/du2) M with M = du/dq.
+    """
+    V_A = V_B - w * l0
+    V_m = V_B - 0.5 * w * l0
+    T_A = math.sqrt(H * H + V_A * V_A)
+    T_B = math.sqrt(H * H + V_B * V_B)
+    T_m = math.sqrt(H * H + V_m * V_m)
+    sA, sB, cA, cB = V_A / T_A, V_B / T_B, H / T_A, H / T_B
+    f = l0 / (T_A + T_B)
+    Gzz = 2.0 * f * cA * cB / (1.0 - w * w * f * f) if w * f < 0.5 else (sB - sA) / w
+    Gxz = -f * (V_A + V_B) * cA / T_B
+    EA, dEA = secant_stiffness(T_A, asymptote, softening, offset)
+    # The stretch of the span per newton is l0 c(T_A), what is left in the run R p(T_A).
+    c = 1.0 / EA
+    c1 = -dEA * c * c
+    c2 = 0.0
+    if softening != 0.0:
+        c2 = 2.0 * dEA * c * c * (dEA * c + 1.0 / (T_A + offset))
+    strain1, strain2 = _strain(T_A, asymptote, softening, offset)
+    p = 1.0 / (1.0 + T_A * c)
+    p1 = -strain1 * p * p
+    p2 = (2.0 * strain1 * strain1 * p - strain2) * p * p
+    # By H, V_B, l0 each: changes of H; of V at A and in the middle; of T there; of l0 c; of l0.
+    by_H = (1.0, 0.0, 0.0, cA, H / T_m, l0 * c1 * cA, 0.0)
+    by_V = (0.0, 1.0, 1.0, sA, V_m / T_m, l0 * c1 * sA, 0.0)
+    by_l = (0.0, -w, -0.5 * w, -w * sA, -0.5 * w * V_m / T_m, c - l0 * c1 * w * sA, 1.0)
+    # Second derivatives of the inextensible span (X, Z).
+    sines = sB * sB + sB * sA + sA * sA
+    cosines = cB * cB + cB * cA + cA * cA
+    XV, ZV = Gxz * (1.0 - cosines) / H, Gzz * (sines - 1.0) / H
+    slope = sA * cA / T_A
+    rates = (H, V_m, T_A, T_m, l0, c1, c2, run * p1, run * p2, g)
+    HH = _pair(by_H, by_H, -Gzz * sines / H, XV, rates)
+    HV = _pair(by_H, by_V, XV, ZV, rates)
+    VV = _pair(by_V, by_V, ZV, Gxz * cosines / H, rates)
+    Hl = _pair(by_H, by_l, sA * sA / T_A, -slope, rates)
+    Vl = _pair(by_V, by_l, -slope, cA * cA / T_A, rates)
+    ll = _pair(by_l, by_l, w * slope, -w * cA * cA / T_A, rates)
+    S = ((HH, HV, Hl), (HV, VV, Vl), (Hl, Vl, ll))
+    x, z, l = moves
+    Sx, Sz, Sl = _times(S, x), _times(S, z), _times(S, l)
+    xz, xl, zl = _dot(x, Sz), _dot(x, Sl), _dot(z, Sl)
+    return (_dot(x, Sx), xz, xl), (xz, _dot(z, Sz), zl), (xl, zl, _dot(l, Sl))
+
+
+@jit
+def _pair(a, b, X, Z, rates):
+    """Return the second derivative, by a and b as in `_curvature`, of T in the middle minus
+    g . (x, z, length); X, Z are those of the inextensible span.
+    """
+    H, V_m, T_A, T_m, l0, c1, c2, p1, p2, g = rates
+    T_A2 = (a[0] * b[0] + a[1] * b[1] - a[3] * b[3]) / T_A
+    T_m2 = (a[0] * b[0] + a[2] * b[2] - a[4] * b[4]) / T_m
+    e = l0 * (c2 * a[3] * b[3] + c1 * T_A2) + c1 * (a[3] * b[6] + b[3] * a[6])
+    x = X + a[0] * b[5] + b[0] * a[5] + H * e
+    z = Z + a[2] * b[5] + b[2] * a[5] + V_m * e
+    return T_m2 - g[0] * x - g[1] * z - g[2] * (p2 * a[3] * b[3] + p1 * T_A2)
+
+
+@jit
+def _dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@jit
+def _times(S, a):
+    """Return the product of S, three rows, and a (3)."""
+    return _dot(S[0], a), _dot(S[1], a), _dot(S[2], a)
+
+
+@jit
 def _differentiate(
     i, p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, damping_time,
-    H, V_B, clamped, out, jacobian,
+    H, V_B, clamped, linear, out, jacobian,
 ):  # fmt: skip
     """Write jacobian[i] from the solution in out[i]. Return whether a number is not finite."""
     dx, dy, Bz, Bx, L = _chord(i, p_WA, p_WB)
     l = float(length[i])
     rate = float(length_rate[i])
-    run = float(drum_run[i])
+    vx = float(v_WB[i, 0])
+    vy = float(v_WB[i, 1])
+    vz = float(v_WB[i, 2])
+    asymptote = float(stiffness[0])
+    softening = float(stiffness[1])
+    offset = float(stiffness[2])
     w = max(w, MIN_WEIGHT)
     l0 = float(out[i, 13])
-    _x, _z, _r, Kxx, Kxz, Kzx, Kzz, mx, mz, mu, k, T_A, T_B, EA, dEA = _linearise(
-        H, V_B, l0, l, run, w, float(stiffness[0]), float(stiffness[1]), float(stiffness[2])
-    )
     q = H / clamped
     hx = q * dx
     hy = q * dy
@@ -559,75 +726,94 @@ def _differentiate(
     V_A = V_B - w * l0
     T_A = math.sqrt(h * h + V_A * V_A)
     T_B = math.sqrt(h * h + V_B * V_B)
-    T_d, clipped, chord_rate = _damping(
-        i, dx, dy, Bz, L, v_WB, l, rate, damping_time, EA, min(T_A, T_B)
-    )
-    s = 1.0 + T_d / T_B
+    EA, dEA = secant_stiffness(T_A, asymptote, softening, offset)
+    strain1, strain2 = _strain(T_A, asymptote, softening, offset)
+    flexibility = l * strain1
+    moves = _in_plane(H, V_A, linear)
+    e_x, e_z, e_l = _stretch(H, 0.5 * (V_A + V_B), w, moves, flexibility)
+    e_q = e_x / clamped
+    e_t = (e_q * h * Bx + e_z * V_B) / T_B
     viscosity = EA * damping_time / l
-    if clipped:
-        viscosity = 0.0
+    across = dx * vx + dy * vy
+    stretching = e_q * across + e_z * vz + e_l * rate
+    T_d, cut = _damping(viscosity, stretching, e_l, e_t, T_A, T_B)
+    bends = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    if T_d != 0.0:
+        g = (e_x / flexibility, e_z / flexibility, e_l / flexibility)
+        bends = _curvature(
+            H, V_B, l0, float(drum_run[i]), w, asymptote, softening, offset, moves, g
+        )
     for c in (0, 1, 2, 6):
         px = 1.0 if c == 0 else 0.0
         py = 1.0 if c == 1 else 0.0
         pz = 1.0 if c == 2 else 0.0
-        if c == 6:
-            dBx = 0.0
-            dH = -(Kxx * mx + Kxz * mz)
-            dV_B = -(Kzx * mx + Kzz * mz)
-            dl0 = mu + k * (H * dH + V_A * dV_B)
-            dT_d = -T_d / l
-        else:
-            if clamped > Bx:
-                dBx = MIN_SLOPE * (dx * px + dy * py + Bz * pz) / L
-            else:
-                dBx = (dx * px + dy * py) / Bx
-            dH = Kxx * dBx + Kxz * pz
-            dV_B = Kzx * dBx + Kzz * pz
-            dl0 = k * (H * dH + V_A * dV_B)
-            along = (dx * px + dy * py + Bz * pz) / L
-            dT_d = viscosity * (float(v_WB[i, c]) - chord_rate * along) / L
+        along = dx * px + dy * py
+        dBx = MIN_SLOPE * (along + Bz * pz) / L if clamped > Bx else along / Bx
+        change = (dBx, pz, 1.0 if c == 6 else 0.0)
+        dl = change[2]
+        dH = moves[0][0] * dBx + moves[1][0] * pz + moves[2][0] * dl
+        dV_B = moves[0][1] * dBx + moves[1][1] * pz + moves[2][1] * dl
+        dl0 = moves[0][2] * dBx + moves[1][2] * pz + moves[2][2] * dl
         dq = (dH - q * dBx) / clamped
         dhx = dq * dx + q * px
         dhy = dq * dy + q * py
-        dh = dq * Bx + q * (dx * px + dy * py) / Bx
+        dh = dq * Bx + q * along / Bx
         dV_A = dV_B - w * dl0
         dT_A = (h * dh + V_A * dV_A) / T_A
         dT_B = (h * dh + V_B * dV_B) / T_B
-        if clipped:
-            dT_d = -(dT_A if T_A < T_B else dT_B)
-        else:
-            dT_d += T_d * dEA / EA * dT_A
-        ds = (dT_d - T_d * dT_B / T_B) / T_B
-        jacobian[i, 0, c] = -(s * dhx + ds * hx)
-        jacobian[i, 1, c] = -(s * dhy + ds * hy)
-        jacobian[i, 2, c] = -(s * dV_B + ds * V_B)
-        jacobian[i, 3, c] = dT_A + dT_d
-        jacobian[i, 4, c] = dT_B + dT_d
+        dT_d = 0.0
+        de_q = 0.0
+        de_z = 0.0
+        de_l = 0.0
+        de_t = 0.0
+        if T_d != 0.0:
+            grows = dl / l + strain2 / strain1 * dT_A
+            de_q = (flexibility * _dot(bends[0], change) + grows * e_x - e_q * dBx) / clamped
+            de_z = flexibility * _dot(bends[1], change) + grows * e_z
+            de_l = flexibility * _dot(bends[2], change) + grows * e_l
+            de_t = de_q * h * Bx + e_q * (dh * Bx + h * along / Bx) + de_z * V_B + e_z * dV_B
+            de_t = (de_t - e_t * dT_B) / T_B
+            if cut == 1:
+                dT_d = (dT_A - T_d * de_l) / e_l
+            elif cut == 2:
+                dT_d = -(dT_B + T_d * de_t) / e_t
+            else:
+                drift = vx * px + vy * py
+                dT_d = viscosity * (de_q * across + e_q * drift + de_z * vz + de_l * rate)
+                dT_d += T_d * (dEA / EA * dT_A - dl / l)
+        jacobian[i, 0, c] = -(dhx + (dT_d * e_q + T_d * de_q) * dx + T_d * e_q * px)
+        jacobian[i, 1, c] = -(dhy + (dT_d * e_q + T_d * de_q) * dy + T_d * e_q * py)
+        jacobian[i, 2, c] = -(dV_B + dT_d * e_z + T_d * de_z)
+        jacobian[i, 3, c] = 0.0 if cut == 1 else dT_A - dT_d * e_l - T_d * de_l
+        jacobian[i, 4, c] = 0.0 if cut == 2 else dT_B + dT_d * e_t + T_d * de_t
         jacobian[i, 5, c] = (dhx - hx * dT_A / T_A) / T_A
         jacobian[i, 6, c] = (dhy - hy * dT_A / T_A) / T_A
         jacobian[i, 7, c] = (dV_A - V_A * dT_A / T_A) / T_A
         jacobian[i, 8, c] = (dhx - hx * dT_B / T_B) / T_B
         jacobian[i, 9, c] = (dhy - hy * dT_B / T_B) / T_B
         jacobian[i, 10, c] = (dV_B - V_B * dT_B / T_B) / T_B
-        turn = (Bx * pz - Bz * (dx * px + dy * py) / Bx) / (L * L)
+        turn = (Bx * pz - Bz * along / Bx) / (L * L)
         jacobian[i, 11, c] = (h * dV_B - V_B * dh) / (T_B * T_B) - turn
         jacobian[i, 12, c] = dh
         jacobian[i, 13, c] = dl0
+    if cut:
+        viscosity = 0.0
     for c in (3, 4, 5, 7):
-        dT_d = -viscosity
+        dT_d = viscosity * e_l
         if c == 3:
-            dT_d = viscosity * dx / L
+            dT_d = viscosity * e_q * dx
         elif c == 4:
-            dT_d = viscosity * dy / L
+            dT_d = viscosity * e_q * dy
         elif c == 5:
-            dT_d = viscosity * Bz / L
+            dT_d = viscosity * e_z
         for row in range(5, 14):
             jacobian[i, row, c] = 0.0
-        for row in range(3):
-            jacobian[i, row, c] = -dT_d * out[i, 8 + row]
-        jacobian[i, 3, c] = dT_d
-        jacobian[i, 4, c] = dT_d
-    return not math.isfinite(Kxx + Kxz + Kzx + Kzz + mx + mz + viscosity)
+        jacobian[i, 0, c] = -dT_d * e_q * dx
+        jacobian[i, 1, c] = -dT_d * e_q * dy
+        jacobian[i, 2, c] = -dT_d * e_z
+        jacobian[i, 3, c] = -dT_d * e_l
+        jacobian[i, 4, c] = dT_d * e_t
+    return not math.isfinite(sum(moves[0]) + sum(moves[1]) + sum(moves[2]) + viscosity)
 
 
 @jit
@@ -638,13 +824,14 @@ def cable_forces_jacobian(
     (k, 14, 8). Where the damping is held at its limit the derivative is that of the limit.
     """
     for i in range(len(length)):
-        failed, H, V_B, Bx = _force(
-            i, p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, damping_time, out
-        )
+        failed, H, V_B, Bx, linear = _force(
+            i, p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, damping_time, True,
+            out,
+        )  # fmt: skip
         if not failed:
             failed = _differentiate(
                 i, p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, damping_time,
-                H, V_B, Bx, out, jacobian,
+                H, V_B, Bx, linear, out, jacobian,
             )  # fmt: skip
         if failed:
             return i + 1
