@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_drake.experiments.paper_tests import paper_test
+from cdpr_drake.experiments.paper_tests import NUMBERS, paper_test
 from cdpr_drake.experiments.reproduction.assumptions import printed
+from cdpr_drake.experiments.reproduction.null_models import chance_of_cables, chance_of_order
 from cdpr_drake.experiments.reproduction.section import Case, Claim, Figure, Result, Section
 from cdpr_drake.experiments.reproduction.traces import (
     cable_panel,
@@ -144,7 +145,7 @@ def _figure_15(results: Mapping[str, Result]) -> Figure:
 def _claims_of_test(number: int) -> Callable[[Mapping[str, Result]], list[Claim]]:
     def claims(results: Mapping[str, Result]) -> list[Claim]:
         result = results[key(number, "SCMWE", "robot")]
-        found = [_amplitude(number), _exponential({"": result})]
+        found = [_amplitude(number), _exponential(number, {"": result})]
         if number == 1:
             found.append(_least_tensed(result))
         if number == 3:
@@ -165,12 +166,14 @@ def _amplitude(number: int) -> Claim:
         printed=f"{metres} m, {degrees}°",
         ours=f"{distance:.2f} m, {angle:.1f}°",
         agrees=abs(distance - metres) <= ROUNDED[0] and abs(angle - degrees) <= ROUNDED[1],
+        kind="by construction",
+        null="a slip in a copy of the printed numbers: both sides are printed",
         reason=f"from the printed poses, which are rounded to {ROUNDED[0]:g} m and "
         f"{ROUNDED[1]:.1f}°",
     )
 
 
-def _exponential(runs: Mapping[str, Result]) -> Claim:
+def _exponential(number: int, runs: Mapping[str, Result]) -> Claim:
     gain = next(iter(runs.values()))["gain"]
     rates = {name: rate(result) for name, result in runs.items()}
     final = max(float(np.mean(sizes(r)[-10:, 0])) for r in runs.values())
@@ -180,7 +183,19 @@ def _exponential(runs: Mapping[str, Result]) -> Claim:
         ours=", ".join(f"{name} {r:.4f} 1/s".strip() for name, r in rates.items())
         + f" for λ = {gain:g} 1/s; {final:.1f} mm seen at the end",
         agrees=all(abs(r / gain - 1.0) < RATE_TOLERANCE for r in rates.values()),
+        kind="by construction",
+        null="another gain: the exponential that was put in is read off again",
+        parameters="gain",
+        reason=f"λ: {_source_of_gain(number)}",
     )
+
+
+def _source_of_gain(number: int) -> str:
+    """Return where a test's gain comes from, as its file says of the first test with that gain."""
+    gain = paper_test(number).gain
+    test = next(t for t in map(paper_test, NUMBERS) if t.gain == gain)
+    assumed = [text for text in test.assumptions if text.startswith("gain: ")]
+    return test.sources.get("gain", " ".join(assumed).removeprefix("gain: "))
 
 
 def _least_tensed(result: Result) -> Claim:
@@ -192,7 +207,11 @@ def _least_tensed(result: Result) -> Claim:
         printed=_cables(theirs),
         ours=f"{_cables(least)}; largest dβ: {_cables(most)}",
         agrees=least == theirs and most == theirs,
-        reason="means over the run",
+        kind="tested",
+        null="the two cables of any post",
+        null_rate=chance_of_cables(theirs),
+        parameters="the camera's place, the centre of mass (assumed)",
+        reason="means over the run; that dβ is largest where a cable is least tensed follows",
     )
 
 
@@ -203,6 +222,8 @@ def _less_tensed_than_loaded(results: Mapping[str, Result]) -> Claim:
         printed="smaller than in Tests 1 and 2",
         ours=", ".join(f"{mean:.0f} N" for mean in means) + " on mean in Tests 1, 2, 3",
         agrees=bool(means[2] < min(means[:2])),
+        kind="by construction",
+        null="nothing: less than half the mass hangs on the same cables",
     )
 
 
@@ -213,6 +234,8 @@ def _sag(result: Result) -> Claim:
         printed="small",
         ours=f"{low:.2f}° to {high:.2f}°",
         agrees=bool(low > 0.0 and high < 5.0),
+        kind="by construction",
+        null="nothing: a taut cable that has weight sags a little",
     )
 
 
@@ -220,7 +243,7 @@ def _claims_of_13(results: Mapping[str, Result]) -> list[Claim]:
     found = []
     for number in (4, 5):
         runs = {m: results[key(number, m, "robot")] for m in ("SCMWE", "SLSM")}
-        found += [_amplitude(number), _exponential(runs)]
+        found += [_amplitude(number), _exponential(number, runs)]
     return found
 
 
@@ -236,7 +259,10 @@ def _similar(number: int, results: Mapping[str, Result], models: Sequence[str]) 
         printed="correspond well",
         ours=", ".join(f"{m}: at most {100 * a:.1f} % of the move apart" for m, a in apart.items()),
         agrees=max(apart.values()) < CLOSE,
-        reason="both are simulations here: this shows what noise and calibration change",
+        kind="by construction",
+        null="nothing: both are simulations here, of one model",
+        parameters="noise, calibration errors (assumed)",
+        reason="this shows what noise and calibration change",
     )
 
 
@@ -256,13 +282,21 @@ def _claims_of_15(results: Mapping[str, Result]) -> list[Claim]:
             printed=_cables(theirs),
             ours="; ".join(f"{place}: {_cables(found)}" for place, found in most.items()),
             agrees=all(found == theirs for found in most.values()),
-            reason="means over the run",
+            kind="tested",
+            null="the four cables of any two posts",
+            null_rate=chance_of_cables(theirs),
+            parameters="the camera's place, the centre of mass (assumed)",
+            reason="means over the run; robot and simulator are one model, and counted once",
         ),
         Claim(
             text="tensions are larger in the experiments than in simulation",
             printed="on overall larger",
             ours=f"{ratio:.2f} times on mean in Test 2",
             agrees=ratio > 1.05,
+            kind="tested",
+            null="either of the two is larger",
+            null_rate=chance_of_order(2),
+            parameters="noise, calibration errors (assumed)",
             reason="the paper attributes it to friction at winches and eyelets, which both of our "
             "settings leave out",
         ),
