@@ -23,7 +23,7 @@ from fake_paper import FakeTable
 
 from cdpr_drake.__main__ import main
 from cdpr_drake.commands import reproduce as command
-from cdpr_drake.experiments.reproduction import figures, poses, sources
+from cdpr_drake.experiments.reproduction import figures, figures_claims, poses, sources
 from cdpr_drake.experiments.reproduction import reproduce as machinery
 from cdpr_drake.experiments.reproduction.assumptions import printed
 from cdpr_drake.experiments.reproduction.null_models import (
@@ -388,9 +388,9 @@ def test_a_figure_is_made_of_its_runs(part: figures.PaperFigure) -> None:
 
 
 def test_what_holds_at_any_pose_of_the_tests_is_no_test() -> None:
-    assert poses.share_of_rates(figures.RATE_TOLERANCE) == 1.0
+    assert poses.share_of_rates(figures_claims.RATE_TOLERANCE) == 1.0
     assert poses.share_less_tensed() == 1.0
-    assert poses.share_of_sag(*figures.SMALL) == 1.0
+    assert poses.share_of_sag(*figures_claims.SMALL) == 1.0
     assert 0.0 < poses.share_of_sag(0.0, 0.5) < 1.0  # it could come out otherwise
     assert poses.share_of_rates(1e-4) == 0.0
 
@@ -402,7 +402,7 @@ def test_an_amplitude_that_is_not_the_printed_one_differs(monkeypatch: pytest.Mo
     assert claim.agrees and claim.printed == "4.35 m, 8.0°" and claim.ours.startswith("4.35 m, 8.")
     entry = printed("figures")["amplitude_1"]
     others = {**printed("figures"), "amplitude_1": dataclasses.replace(entry, value=[4.37, 8.0])}
-    monkeypatch.setattr(figures, "printed", lambda section: others)
+    monkeypatch.setattr(figures_claims, "printed", lambda section: others)
     assert not part.section(results).claims[0].agrees
 
 
