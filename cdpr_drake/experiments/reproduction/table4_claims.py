@@ -19,7 +19,7 @@ TOLERANCE = {"position": 10.0, "orientation": 0.5}
 CLOSE_Z, CLOSE_LARGEST = 0.15, 0.25
 """How near the two printed JSC errors ours must be, as a share of them."""
 
-ESTIMATORS = {"mean": "the paper's estimator", "joint": "ours"}
+ESTIMATORS = {"mean": "the paper's estimator", "joint": "our estimator"}
 """Of the pose, by the kind of calibration; the paper's is the mean of the patterns' poses."""
 
 CALIBRATION = "calibration_poses, calibration_turn, the images' and the tracker's errors (assumed)"
