@@ -19,13 +19,20 @@ from typing import Any
 from cdpr_drake.experiments.reproduction.words import (
     count_of_claims,
     fitted_and_assumed,
+    how_often,
     in_words,
+    tested,
     verdict,
 )
 
 DOCS = Path(__file__).resolve().parent
 REPORT = DOCS / "reproduction.json"
 PAGES = (DOCS.parent / "README.md", DOCS / "reproduction.md")
+
+CLAIM_HEADINGS = (
+    "claim", "paper", "here", "", "kind", "what could have come out otherwise",
+    "of that would agree", "free parameters", "why, or on what terms",
+)  # fmt: skip
 
 MARK = re.compile(r"(<!-- begin (\w+) -->\n)(.*?)(<!-- end \2 -->)", re.DOTALL)
 
@@ -35,7 +42,7 @@ def filled(page: str, report: Mapping[str, Any]) -> str:
 
     Args:
         page: Markdown, with lines `<!-- begin NAME -->` and `<!-- end NAME -->`; a name is that of
-            a section, or summary, parameters or effort.
+            a section, or summary, headline, parameters or effort.
         report: as `cdpr-drake reproduce` writes it.
 
     Raises:
@@ -45,7 +52,12 @@ def filled(page: str, report: Mapping[str, Any]) -> str:
     if page.count("<!-- begin ") != len(MARK.findall(page)):
         raise ValueError("a mark has no end")
     parts = {section["name"]: section for section in report["sections"]}
-    whole = {"summary": _summary, "parameters": _parameters, "effort": _effort}
+    whole = {
+        "summary": _summary,
+        "headline": _headline,
+        "parameters": _parameters,
+        "effort": _effort,
+    }
 
     def content(found: re.Match[str]) -> str:
         name = found[2]
@@ -56,15 +68,21 @@ def filled(page: str, report: Mapping[str, Any]) -> str:
 
 
 def _summary(report: Mapping[str, Any]) -> Iterable[str]:
-    """Yield a table with a line for each claim."""
+    """Yield a table with a line for each claim that could have failed."""
     rows = [
-        (section["title"].partition(":")[0], c["text"], c["printed"], c["ours"], verdict(c))
+        (title, c["text"], c["printed"], c["ours"], verdict(c), how_often(c))
         for section in report["sections"]
-        for c in section["claims"]
+        for title in [section["title"].partition(":")[0]]
+        for c in tested(section["claims"])
     ]
-    yield count_of_claims(report)
+    yield from _headline(report)
     yield ""
-    yield from _table(("", "claim", "paper", "here", ""), rows)
+    yield from _table(("", "tested claim", "paper", "here", "", "null model agrees"), rows)
+
+
+def _headline(report: Mapping[str, Any]) -> Iterable[str]:
+    """Yield how many claims agree."""
+    yield count_of_claims(report)
 
 
 def _parameters(report: Mapping[str, Any]) -> Iterable[str]:
@@ -94,11 +112,13 @@ def _section(section: Mapping[str, Any]) -> Iterable[str]:
     """Yield the text, the claims and the tables of a section."""
     yield from "\n\n".join(map(_escaped, section["text"])).split("\n")
     rows = [
-        (c["text"], c["printed"], c["ours"], verdict(c), c["reason"]) for c in section["claims"]
-    ]
+        (*(c[of] for of in ("text", "printed", "ours")), verdict(c), c["kind"], c["null"],
+         how_often(c), c["parameters"], c["reason"])
+        for c in section["claims"]
+    ]  # fmt: skip
     if rows:
         yield ""
-        yield from _table(("claim", "paper", "here", "", "why, or on what terms"), rows)
+        yield from _table(CLAIM_HEADINGS, rows)
     for number in range(len(section["figures"])):
         file = section["name"] + (f"-{number + 1}" if number else "")
         yield ""

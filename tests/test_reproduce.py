@@ -23,12 +23,18 @@ from fake_paper import FakeTable
 
 from cdpr_drake.__main__ import main
 from cdpr_drake.commands import reproduce as command
-from cdpr_drake.experiments.reproduction import figures, sources
+from cdpr_drake.experiments.reproduction import figures, figures_claims, poses, sources
 from cdpr_drake.experiments.reproduction import reproduce as machinery
 from cdpr_drake.experiments.reproduction.assumptions import printed
+from cdpr_drake.experiments.reproduction.null_models import (
+    chance_of_cables,
+    chance_of_order,
+    share,
+    within,
+)
 from cdpr_drake.experiments.reproduction.registry import reproductions
 from cdpr_drake.experiments.reproduction.reproduce import report_of, reproduce
-from cdpr_drake.experiments.reproduction.section import Figure, Reproduction
+from cdpr_drake.experiments.reproduction.section import Claim, Figure, Reproduction, kind_by
 from cdpr_drake.experiments.reproduction.traces import difference, rate, sizes
 from cdpr_drake.experiments.reproduction.words import count_of_claims, in_words
 from cdpr_drake.show.paper_figures import panel_svg, paper_figure
@@ -103,7 +109,10 @@ def test_equal_cases_of_two_sections_run_once(
         {"name": "modulus", "value": 60.0},
         {"name": "points", "value": [1.0, 2.0]},
     ]
-    assert count_of_claims(report) == "2 of 4 claims agree, 2 differ."
+    assert count_of_claims(report).startswith(
+        "2 of 4 tested claims agree, where null models would meet 1.2 on average; 0 follow fits "
+        "or choices and 2 come out as they do by construction"
+    )
 
 
 def test_what_was_done_by_the_same_source_is_not_done_again(
@@ -253,12 +262,13 @@ def test_the_page_has_all_claims_tables_and_figures(page: str) -> None:
     parsed = Page(page)
     text = " ".join(parsed.text.split())
     for part in (
-        "2 of 4 claims agree, 2 differ.", "Squares grow", "1 < 4", "One is <b>exact</b>", "3.14",
+        "2 of 4 tested claims agree, where", "Squares grow", "a <coin>: 50 % would agree",
+        "free parameters: a modulus", "by construction", "1 < 4", "One is <b>exact</b>", "3.14",
         "2.72", "because of “rounding” & noise", "one: squares & <roots>", "A note.", "Made up.",
         "One paragraph with <angles> & an ampersand.", "x^2 [-]",
     ):  # fmt: skip
         assert part in text, part
-    assert page.count('class="mark">agrees') == 2 and page.count('class="mark">differs') == 2
+    assert page.count('class="mark">agrees') == 4 and page.count('class="mark">differs') == 2
     assert parsed.counts["svg"] == 4 and parsed.counts["table"] == 4
     assert 'name="viewport"' in page and "prefers-color-scheme: dark" in page
     assert "nan" not in text.lower().split()
@@ -377,6 +387,14 @@ def test_a_figure_is_made_of_its_runs(part: figures.PaperFigure) -> None:
     assert not any(agrees for text, agrees in again.items() if "exponentially" in text)
 
 
+def test_what_holds_at_any_pose_of_the_tests_is_no_test() -> None:
+    assert poses.share_of_rates(figures_claims.RATE_TOLERANCE) == 1.0
+    assert poses.share_less_tensed() == 1.0
+    assert poses.share_of_sag(*figures_claims.SMALL) == 1.0
+    assert 0.0 < poses.share_of_sag(0.0, 0.5) < 1.0  # it could come out otherwise
+    assert poses.share_of_rates(1e-4) == 0.0
+
+
 def test_an_amplitude_that_is_not_the_printed_one_differs(monkeypatch: pytest.MonkeyPatch) -> None:
     part = figures.FIGURES[0]
     results = {part.cases()[0].key: decay(0.03, np.ones(8))}
@@ -384,7 +402,7 @@ def test_an_amplitude_that_is_not_the_printed_one_differs(monkeypatch: pytest.Mo
     assert claim.agrees and claim.printed == "4.35 m, 8.0°" and claim.ours.startswith("4.35 m, 8.")
     entry = printed("figures")["amplitude_1"]
     others = {**printed("figures"), "amplitude_1": dataclasses.replace(entry, value=[4.37, 8.0])}
-    monkeypatch.setattr(figures, "printed", lambda section: others)
+    monkeypatch.setattr(figures_claims, "printed", lambda section: others)
     assert not part.section(results).claims[0].agrees
 
 
@@ -412,7 +430,8 @@ def test_the_command_writes_a_report_and_tells_what_it_found(
     assert "  agrees  squares grow" in lines
     assert "  differs  one is <b>exact</b>" in lines
     assert "          paper: 3.14; here: 2.72" in lines
-    assert any(line.startswith("1 of 2 claims agree, 1 differ.") for line in lines)
+    assert "          tested; a <coin>: 50 % would agree" in lines
+    assert any(line.startswith("1 of 2 tested claims agree, where") for line in lines)
     assert lines[-1] == "In out/reproduction: report.html, report.json, one.png"
     folder = tmp_path / "out" / "reproduction"
     report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
@@ -485,6 +504,48 @@ def test_readme_and_docs_say_what_the_kept_report_says(pages: ModuleType) -> Non
             assert (pages.DOCS / picture).is_file(), picture
 
 
+def test_every_published_claim_states_what_could_have_come_out_otherwise(pages: ModuleType) -> None:
+    report = json.loads(pages.REPORT.read_text(encoding="utf-8"))
+    claims = [claim for section in report["sections"] for claim in section["claims"]]
+    assert claims
+    for claim in claims:
+        Claim(**claim)  # refuses what is tested without the rate of a null model
+    counted = [claim for claim in claims if claim["kind"] == "tested"]
+    agree = sum(claim["agrees"] for claim in counted)
+    headline = f"{agree} of {len(counted)} tested claims agree"
+    assert count_of_claims(report).startswith(headline)
+    assert headline in (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"kind": "tested"}, "no rate"),
+        ({"kind": "tested", "null_rate": 0.51}, "null rate of 0.51"),
+        ({"kind": "tested", "null_rate": float("nan")}, "null rate of nan"),
+        ({"kind": "fitted"}, "no rate"),
+        ({"kind": "fitted", "null_rate": 1.1}, "null rate of 1.1"),
+        ({"kind": "by construction", "null": ""}, "otherwise is not said"),
+        ({"kind": "believed", "null_rate": 0.1}, "unknown kind"),
+    ],
+)
+def test_a_claim_without_its_null_model_is_refused(fields: dict[str, Any], message: str) -> None:
+    claim = {"text": "t", "printed": "1", "ours": "1", "agrees": True, "null": "another"}
+    with pytest.raises(ValueError, match=message):
+        Claim(**{**claim, **fields})
+
+
+def test_what_chance_would_meet() -> None:
+    assert chance_of_order(3) == 1.0 / 6.0
+    assert chance_of_cables([1, 2]) == 1.0 / 4.0 and chance_of_cables([1, 2, 7, 8]) == 1.0 / 6.0
+    assert chance_of_cables([2, 3]) == 1.0 / 28.0
+    assert share([True, False, False, False]) == 0.25
+    assert within(1.0, 2.0, 2.0) and within(4.0, 2.0, 2.0) and not within(0.9, 2.0, 2.0)
+    assert not within(-2.0, 2.0, 2.0) and not within(float("nan"), 2.0, 2.0)
+    assert kind_by(True, 0.5) == "tested" and kind_by(True, 0.51) == "by construction"
+    assert kind_by(False, 0.51) == "tested"  # a failure counts, however likely a success was
+
+
 def test_every_section_of_the_report_is_in_the_docs(pages: ModuleType) -> None:
     text = (pages.DOCS / "reproduction.md").read_text(encoding="utf-8")
     assert set(reproductions()) <= {mark[1] for mark in pages.MARK.findall(text)}
@@ -499,9 +560,12 @@ def test_pages_are_filled_between_their_marks_only(
         "<!-- begin two -->\n<!-- end two -->\n"
     )
     text = pages.filled(page, report)
-    assert text.startswith("A\n<!-- begin summary -->\n2 of 4 claims agree, 2 differ.\n\n|")
-    assert "old" not in text and "\n<!-- end summary -->\nB\n" in text
-    assert r"| one | one is \<b\>exact\</b\> | 3.14 | 2.72 | differs |" in text
+    assert text.startswith("A\n<!-- begin summary -->\n2 of 4 tested claims agree")
+    assert "\nold\n" not in text and "\n<!-- end summary -->\nB\n" in text
+    assert r"| one | one is \<b\>exact\</b\> | 3.14 | 2.72 | differs | 12 % |" in text
+    summary, _, section = text.partition("<!-- end summary -->")
+    assert "one is one" not in summary  # only what is tested is in the table of the README
+    assert "| one is one | 1 | 1 | agrees | by construction | nothing |  | none |" in section
     assert "| 0 | 2.0 | 4.0 |  |  |" in text and "![Lines](images/two.png)" in text
     assert pages.filled(text, report) == text
     with pytest.raises(KeyError, match="nobody"):

@@ -17,7 +17,7 @@ from cdpr_drake.errors import SweepError
 from cdpr_drake.experiments.reproduction.registry import reproductions
 from cdpr_drake.experiments.reproduction.reproduce import Reproduced, report_of, reproduce
 from cdpr_drake.experiments.reproduction.section import Reproduction
-from cdpr_drake.experiments.reproduction.words import count_of_claims, verdict
+from cdpr_drake.experiments.reproduction.words import count_of_claims, verdict, what_else
 
 CASES = "cases"
 """Folder in the output's with what has been computed."""
@@ -94,7 +94,7 @@ def _write(folder: Path, report: dict[str, Any], found: Sequence[Reproduced]) ->
 
 
 def _print(report: Mapping[str, Any]) -> None:
-    """Print a summary: each claim, the paper's number and ours."""
+    """Print a summary: each claim, the paper's number and ours, and what it could have been."""
     for section in report["sections"]:
         print()
         print_wrapped(section["title"])
@@ -104,6 +104,7 @@ def _print(report: Mapping[str, Any]) -> None:
             print_wrapped(f"  {verdict(claim)}  {claim['text']}", indent=INDENT)
             numbers = f"paper: {claim['printed']}; here: {claim['ours']}"
             print_wrapped(f"{INDENT}{numbers}", indent=INDENT)
+            print_wrapped(f"{INDENT}{claim['kind']}; {what_else(claim)}", indent=INDENT)
     print()
     minutes = report["cpu_time_s"] / 60.0
     print_wrapped(f"{count_of_claims(report)} {minutes:.1f} minutes of processor time.")

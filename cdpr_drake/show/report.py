@@ -12,7 +12,9 @@ from cdpr_drake.experiments.reproduction.words import (
     count_of_claims,
     fitted_and_assumed,
     in_words,
+    tested,
     verdict,
+    what_else,
 )
 from cdpr_drake.show.paper_figures import panel_svg
 
@@ -71,9 +73,9 @@ def _head(report: Mapping[str, Any]) -> Iterable[str]:
 def _overview(sections: Sequence[Mapping[str, Any]]) -> Iterable[str]:
     yield '<nav aria-label="Overview">'
     for section in sections:
-        claims = section["claims"]
-        agree = sum(claim["agrees"] for claim in claims)
-        count = "failed" if section["errors"] else f"{agree} of {len(claims)}" if claims else ""
+        counted = tested(section["claims"])
+        agree = sum(claim["agrees"] for claim in counted)
+        count = "failed" if section["errors"] else f"{agree} of {len(counted)}" if counted else ""
         yield (
             f'<a href="#{escape(section["name"])}"><span>{escape(section["title"])}</span>'
             f"<span>{count}</span></a>"
@@ -111,6 +113,10 @@ def _claim(claim: Mapping[str, Any]) -> Iterable[str]:
     yield (
         f"<dl><div><dt>paper</dt><dd>{escape(claim['printed'])}</dd></div>"
         f"<div><dt>here</dt><dd>{escape(claim['ours'])}</dd></div></dl>"
+    )
+    yield (
+        f'<p class="quiet"><strong>{claim["kind"]}</strong>; what could have come out otherwise: '
+        f"{escape(what_else(claim))}; free parameters: {escape(claim['parameters'])}.</p>"
     )
     if claim["reason"]:
         yield f'<p class="quiet">{escape(claim["reason"])}</p>'

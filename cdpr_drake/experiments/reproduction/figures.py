@@ -5,20 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from cdpr_drake.experiments.paper_tests import paper_test
-from cdpr_drake.experiments.reproduction.assumptions import printed
+from cdpr_drake.experiments.reproduction import figures_claims as claims
+from cdpr_drake.experiments.reproduction.figures_claims import key
 from cdpr_drake.experiments.reproduction.section import Case, Claim, Figure, Result, Section
-from cdpr_drake.experiments.reproduction.traces import (
-    cable_panel,
-    difference,
-    error_panels,
-    rate,
-    sizes,
-    trace,
-)
-from cdpr_drake.model.rotations import Array
+from cdpr_drake.experiments.reproduction.traces import cable_panel, error_panels, trace
 
 ROBOT = (
     "“Robot” is our plant with noisy cameras and load cells and one random calibration error, in "
@@ -28,15 +18,6 @@ SIMULATOR = (
     "“Simulator” is the same plant with perfect measurements and exact calibration, as in "
     "section 7.2."
 )
-
-RATE_TOLERANCE = 0.05
-"""A decay is exponential if the rate that fits it is λ to this part."""
-
-ROUNDED = (0.01, float(np.degrees(0.01)))
-"""The last digit of the printed poses [m, deg]."""
-
-CLOSE = 0.05
-"""Two runs are similar if they are never farther apart than this part of the move."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,17 +66,6 @@ class PaperFigure:
         )
 
 
-def key(number: int, cable_model: str, setting: str) -> str:
-    """Return the key of a run.
-
-    Args:
-        number: of the test.
-        cable_model: of the law.
-        setting: "robot" or "simulator".
-    """
-    return f"test-{number}-{cable_model}-{setting}"
-
-
 # --- the figures
 
 
@@ -138,146 +108,6 @@ def _figure_15(results: Mapping[str, Result]) -> Figure:
     return Figure(title="Simulations of Tests 2 and 3", panels=tuple(rows))
 
 
-# --- what the paper says of them
-
-
-def _claims_of_test(number: int) -> Callable[[Mapping[str, Result]], list[Claim]]:
-    def claims(results: Mapping[str, Result]) -> list[Claim]:
-        result = results[key(number, "SCMWE", "robot")]
-        found = [_amplitude(number), _exponential({"": result})]
-        if number == 1:
-            found.append(_least_tensed(result))
-        if number == 3:
-            found.append(_less_tensed_than_loaded(results))
-        return [*found, _sag(result)]
-
-    return claims
-
-
-def _amplitude(number: int) -> Claim:
-    metres, degrees = printed("figures")[f"amplitude_{number}"].value
-    test = paper_test(number)
-    move = test.start.InvertAndCompose(test.goal)
-    distance = float(np.linalg.norm(move.translation()))
-    angle = float(np.degrees(move.rotation().ToAngleAxis().angle()))
-    return Claim(
-        text=f"Test {number} moves by",
-        printed=f"{metres} m, {degrees}°",
-        ours=f"{distance:.2f} m, {angle:.1f}°",
-        agrees=abs(distance - metres) <= ROUNDED[0] and abs(angle - degrees) <= ROUNDED[1],
-        reason=f"from the printed poses, which are rounded to {ROUNDED[0]:g} m and "
-        f"{ROUNDED[1]:.1f}°",
-    )
-
-
-def _exponential(runs: Mapping[str, Result]) -> Claim:
-    gain = next(iter(runs.values()))["gain"]
-    rates = {name: rate(result) for name, result in runs.items()}
-    final = max(float(np.mean(sizes(r)[-10:, 0])) for r in runs.values())
-    return Claim(
-        text="Cartesian errors converge exponentially to small ones",
-        printed="exponentially",
-        ours=", ".join(f"{name} {r:.4f} 1/s".strip() for name, r in rates.items())
-        + f" for λ = {gain:g} 1/s; {final:.1f} mm seen at the end",
-        agrees=all(abs(r / gain - 1.0) < RATE_TOLERANCE for r in rates.values()),
-    )
-
-
-def _least_tensed(result: Result) -> Claim:
-    theirs = printed("figures")["least_tensed_test_1"].value
-    tension, dbeta = np.mean(result["tension"], axis=0), np.mean(result["dbeta"], axis=0)
-    least, most = _first(tension, len(theirs)), _first(-dbeta, len(theirs))
-    return Claim(
-        text="the least tensed cables, whose dβ are the largest, in Test 1",
-        printed=_cables(theirs),
-        ours=f"{_cables(least)}; largest dβ: {_cables(most)}",
-        agrees=least == theirs and most == theirs,
-        reason="means over the run",
-    )
-
-
-def _less_tensed_than_loaded(results: Mapping[str, Result]) -> Claim:
-    means = [np.mean(results[key(n, "SCMWE", "robot")]["tension"]) for n in (1, 2, 3)]
-    return Claim(
-        text="tensions are smaller in Test 3, with less mass",
-        printed="smaller than in Tests 1 and 2",
-        ours=", ".join(f"{mean:.0f} N" for mean in means) + " on mean in Tests 1, 2, 3",
-        agrees=bool(means[2] < min(means[:2])),
-    )
-
-
-def _sag(result: Result) -> Claim:
-    low, high = np.min(result["dbeta"]), np.max(result["dbeta"])
-    return Claim(
-        text="dβ are small but not zero",
-        printed="small",
-        ours=f"{low:.2f}° to {high:.2f}°",
-        agrees=bool(low > 0.0 and high < 5.0),
-    )
-
-
-def _claims_of_13(results: Mapping[str, Result]) -> list[Claim]:
-    found = []
-    for number in (4, 5):
-        runs = {m: results[key(number, m, "robot")] for m in ("SCMWE", "SLSM")}
-        found += [_amplitude(number), _exponential(runs)]
-    return found
-
-
-def _similar(number: int, results: Mapping[str, Result], models: Sequence[str]) -> Claim:
-    apart = {
-        model: difference(
-            results[key(number, model, "robot")], results[key(number, model, "simulator")]
-        )
-        for model in models
-    }
-    return Claim(
-        text=f"Cartesian errors of Test {number} in simulation and experiment",
-        printed="correspond well",
-        ours=", ".join(f"{m}: at most {100 * a:.1f} % of the move apart" for m, a in apart.items()),
-        agrees=max(apart.values()) < CLOSE,
-        reason="both are simulations here: this shows what noise and calibration change",
-    )
-
-
-def _claims_of_15(results: Mapping[str, Result]) -> list[Claim]:
-    theirs = printed("figures")["most_tensed_test_2"].value
-    ours = {
-        place: np.mean(results[key(2, "SCMWE", place)]["tension"], axis=0)
-        for place in ("simulator", "robot")
-    }
-    most = {place: _first(-tension, len(theirs)) for place, tension in ours.items()}
-    ratio = float(np.mean(ours["robot"]) / np.mean(ours["simulator"]))
-    return [
-        _similar(2, results, ("SCMWE",)),
-        _similar(3, results, ("SCMWE",)),
-        Claim(
-            text="the most tensed cables in Test 2, in simulation and experiment",
-            printed=_cables(theirs),
-            ours="; ".join(f"{place}: {_cables(found)}" for place, found in most.items()),
-            agrees=all(found == theirs for found in most.values()),
-            reason="means over the run",
-        ),
-        Claim(
-            text="tensions are larger in the experiments than in simulation",
-            printed="on overall larger",
-            ours=f"{ratio:.2f} times on mean in Test 2",
-            agrees=ratio > 1.05,
-            reason="the paper attributes it to friction at winches and eyelets, which both of our "
-            "settings leave out",
-        ),
-    ]
-
-
-def _first(values: Array, count: int) -> list[int]:
-    """Return the cables of the lowest values, in the order of their numbers from 1."""
-    return sorted(int(i) + 1 for i in np.argsort(values)[:count])
-
-
-def _cables(numbers: Sequence[int]) -> str:
-    return "cables " + ", ".join(map(str, numbers))
-
-
 FIGURES = (
     *(
         PaperFigure(
@@ -286,7 +116,7 @@ FIGURES = (
             text=(ROBOT,),
             runs=tuple((n, "SCMWE", "robot") for n in ((1, 2, 3) if number == 3 else (number,))),
             draw=_one_test(number),
-            claims_of=_claims_of_test(number),
+            claims_of=claims.claims_of_test(number),
         )
         for number in (1, 2, 3)
     ),
@@ -296,7 +126,7 @@ FIGURES = (
         text=(ROBOT,),
         runs=tuple((n, m, "robot") for n in (4, 5) for m in ("SCMWE", "SLSM")),
         draw=_figure_13,
-        claims_of=_claims_of_13,
+        claims_of=claims.claims_of_13,
     ),
     PaperFigure(
         name="figure14",
@@ -304,7 +134,7 @@ FIGURES = (
         text=(f"{ROBOT} {SIMULATOR}",),
         runs=tuple((4, m, p) for m in ("SCMWE", "SLSM") for p in ("robot", "simulator")),
         draw=_figure_14,
-        claims_of=lambda results: [_similar(4, results, ("SCMWE", "SLSM"))],
+        claims_of=lambda results: [claims.similar(4, results, ("SCMWE", "SLSM"))],
     ),
     PaperFigure(
         name="figure15",
@@ -312,7 +142,7 @@ FIGURES = (
         text=(SIMULATOR,),
         runs=tuple((n, "SCMWE", p) for n in (2, 3) for p in ("simulator", "robot")),
         draw=_figure_15,
-        claims_of=_claims_of_15,
+        claims_of=claims.claims_of_15,
     ),
 )
 """Figure 16 is made from the runs of Table 7."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol, get_args
 
 Result = Mapping[str, Any]
 """What a case gives: numbers, texts, lists, mappings of these, and NumPy arrays, by name."""
@@ -42,6 +42,13 @@ class Table:
     note: str = ""
 
 
+Kind = Literal["tested", "fitted", "by construction"]
+"""Of a claim: only what is tested could have come out otherwise, whatever was fitted or assumed."""
+
+MOST = 0.5
+"""What a null model meets more often than this is no test that was passed; to fail it counts."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Claim:
     """A statement of the paper beside what we get.
@@ -51,14 +58,49 @@ class Claim:
         printed: the paper's number or words.
         ours: the number we get.
         agrees: whether it holds here.
-        reason: why it does not, or what the agreement rests on.
+        kind: "tested"; "fitted", if what it hangs on was chosen by it; or "by construction", if it
+            could hardly have come out otherwise.
+        null: what could have come out otherwise: a null model, a permutation, the choices open.
+        null_rate: the share of that, from 0 to 1, which would agree; None if nothing could have
+            come out otherwise.
+        parameters: the free parameters behind it, fitted, assumed or chosen.
+        reason: why it does not hold, or what the agreement rests on.
+
+    Raises:
+        ValueError: an unknown kind; nothing said of a null model; a rate that is missing, is no
+            share, or is too high for a test that was passed.
     """
 
     text: str
     printed: str
     ours: str
     agrees: bool
+    kind: Kind
+    null: str
+    null_rate: float | None = None
+    parameters: str = "none"
     reason: str = ""
+
+    def __post_init__(self) -> None:
+        if self.kind not in get_args(Kind):
+            raise ValueError(f'{self.text}: unknown kind "{self.kind}"')
+        if not self.null:
+            raise ValueError(f"{self.text}: what could have come out otherwise is not said")
+        if self.null_rate is None:
+            if self.kind != "by construction":
+                raise ValueError(f"{self.text}: {self.kind}, but no rate of a null model")
+        elif not 0.0 <= self.null_rate <= (MOST if self.kind == "tested" and self.agrees else 1.0):
+            raise ValueError(f"{self.text}: {self.kind}, but a null rate of {self.null_rate:g}")
+
+
+def kind_by(agrees: bool, null_rate: float) -> Kind:
+    """Return "tested", or "by construction" for what a null model would meet too often as well.
+
+    Args:
+        agrees: whether the claim does.
+        null_rate: of the claim.
+    """
+    return "by construction" if agrees and null_rate > MOST else "tested"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -10,7 +10,8 @@ import numpy as np
 from cdpr_drake.experiments.reproduction import table4_tables as tables
 from cdpr_drake.experiments.reproduction.assumptions import assumed, printed
 from cdpr_drake.experiments.reproduction.explanations import EXPLANATIONS, TESTS
-from cdpr_drake.experiments.reproduction.section import Case, Claim, Result, Section
+from cdpr_drake.experiments.reproduction.section import Case, Result, Section
+from cdpr_drake.experiments.reproduction.table4_claims import claims
 from cdpr_drake.experiments.reproduction.table4_work import (
     FEW,
     PAYLOADS,
@@ -19,6 +20,7 @@ from cdpr_drake.experiments.reproduction.table4_work import (
     explain,
     fitted_ends,
     joint_space_run,
+    moduli,
     noise_run,
     vision_run,
 )
@@ -32,12 +34,6 @@ CHUNK = {"joint": 5, "few": 4, "mean": 10, "independent": 20}
 NOISY_TEST = 3
 VERIFIED_TESTS = (1, 3)
 """Tests whose ends are verified by runs with cameras that see the patterns."""
-
-TOLERANCE = {"position": 10.0, "orientation": 0.5}
-"""What the paper claims of vision-based control in its section 1 [mm, deg]."""
-
-CLOSE_Z, CLOSE_LARGEST = 0.15, 0.25
-"""How near the two printed JSC errors ours must be, as a share of them."""
 
 
 def cases() -> Sequence[Case]:
@@ -63,6 +59,7 @@ def cases() -> Sequence[Case]:
     ]
     work.append(Case(key="noise", function=noise_run, arguments={"number": NOISY_TEST}))
     work.append(Case(key="jsc-statics", function=fitted_ends))
+    work.append(Case(key="moduli", function=moduli))
     return work
 
 
@@ -95,7 +92,7 @@ def section(results: Mapping[str, Result]) -> Section:
             tables.verification(results),
             tables.sensitivity(results["jsc-statics"]),
         ),
-        claims=(*_vision_claims(results, visions["joint"]), *_joint_space_claims(results)),
+        claims=claims(results, visions),
         fitted=assumed(name),
     )
 
@@ -112,120 +109,6 @@ def gather(results: Mapping[str, Result], kind: str) -> dict[str, Array]:
         what: np.concatenate([np.asarray(part[what]) for part in parts])
         for what in ("position", "orientation")
     }
-
-
-def with_noise(results: Mapping[str, Result], ends: Mapping[str, Array]) -> tuple[float, float]:
-    """Return the largest errors of all seeds and tests, norms [mm], [deg], and 3 sigma of noise.
-
-    Args:
-        results: of all cases, by their keys.
-        ends: of `gather`.
-    """
-    noise = results["noise"]
-    largest = [
-        float(np.linalg.norm(ends[what], axis=2).max() + 3.0 * np.linalg.norm(noise[what]))
-        for what in ("position", "orientation")
-    ]
-    return largest[0], largest[1]
-
-
-def _vision_claims(results: Mapping[str, Result], ends: dict[str, Array]) -> list[Claim]:
-    paper = printed(name)
-    position, orientation = with_noise(results, ends)
-    most = [float(np.abs(ends[what]).max()) for what in ("position", "orientation")]
-    test_1 = results["vbc-1"]
-    unfinished = float(np.abs(test_1["then"][:3]).max())
-    left = 1e3 * tables.left_over(1)
-    jsc = np.abs(results["jsc-statics"]["position"][:, 2])
-    seeds = len(ends["position"])
-    return [
-        Claim(
-            text="VBC is accurate to 10 mm and 0.5°",
-            printed="10 mm, 0.5°",
-            ours=f"at most {position:.1f} mm, {orientation:.2f}°",
-            agrees=position <= TOLERANCE["position"] and orientation <= TOLERANCE["orientation"],
-            reason=f"true errors at rest, norms, of {seeds} calibrations in each test, with "
-            f"3 σ of the noise; after {test_1['after']:.0f} s Test 1 is still on its way, "
-            f"{np.linalg.norm(test_1['then'][:3]):.1f} mm off",
-        ),
-        Claim(
-            text="largest VBC errors in Table 4, a component",
-            printed=f"{paper['vbc_position'].value} mm, {paper['vbc_orientation'].value}°",
-            ours=f"{most[0]:.1f} mm, {most[1]:.2f}° at rest; {unfinished:.1f} mm after "
-            f"{test_1['after']:.0f} s",
-            agrees=most[0] <= paper["vbc_position"].value
-            and most[1] <= paper["vbc_orientation"].value,
-            reason=f"ours is less at rest; after {test_1['after']:.0f} s the exponential alone has "
-            f"left {left:.1f} mm of Test 1's move (norm), which may be all of the printed number",
-        ),
-        Claim(
-            text="VBC is more accurate than JSC along z in every test",
-            printed="a significant improvement",
-            ours=f"{np.abs(ends['position'][:, :, 2]).max():.1f} mm against {jsc.min():.1f} mm",
-            agrees=bool(np.abs(ends["position"][:, :, 2]).max() < jsc.min()),
-        ),
-    ]
-
-
-def _joint_space_claims(results: Mapping[str, Result]) -> list[Claim]:
-    paper, statics = printed(name), results["jsc-statics"]
-    position = np.asarray(statics["position"])
-    theirs_z, theirs = paper["jsc_z_test_3"].value, paper["jsc_position"].value
-    z, largest = float(position[2, 2]), float(np.abs(position[:2]).max())
-    sideways = float(np.abs(position[:, :2]).max())
-    empty, loaded = statics["beyond"][:2]
-    one_set = "one set of cables for all tests, fitted to these two numbers"
-    return [
-        Claim(
-            text="JSC error along z in Test 3",
-            printed=f"{theirs_z} mm",
-            ours=f"{z:.1f} mm",
-            agrees=abs(z - theirs_z) <= CLOSE_Z * abs(theirs_z),
-            reason=one_set,
-        ),
-        Claim(
-            text="largest JSC error of Tests 1 and 2",
-            printed=f"{theirs} mm",
-            ours=f"{largest:.1f} mm",
-            agrees=abs(largest - theirs) <= CLOSE_LARGEST * theirs,
-            reason=one_set,
-        ),
-        Claim(
-            text="the JSC error is mainly downwards",
-            printed="relatively poor along the vertical axis",
-            ours=f"z {position[:, 2].max():.1f} to {position[:, 2].min():.1f} mm, x and y at most "
-            f"{sideways:.1f} mm",
-            agrees=bool(position[:, 2].max() < -3.0 * sideways),
-        ),
-        Claim(
-            text="with less mass JSC errs less along z, Test 3 than Tests 1 and 2",
-            printed="lower, a direct consequence of the smaller mass",
-            ours=f"{abs(z):.1f} mm against {', '.join(f'{-p:.1f}' for p in position[:2, 2])} mm",
-            agrees=bool(abs(z) < np.abs(position[:2, 2]).min()),
-        ),
-        Claim(
-            text="VBC is not sensitive to the mass carried, JSC is",
-            printed="not sensitive; Test 3 on overall smaller",
-            ours=f"JSC at Test 2's goal {empty:.1f} mm empty, {loaded:.1f} mm loaded; VBC the same",
-            agrees=bool(abs(loaded) > 1.1 * abs(empty)) and _mass_does_not_matter(results),
-            reason="at rest VBC sees no error, whatever hangs on the cables: runs of both masses "
-            f"end within {_farthest(results):.2f} mm of where the cameras say",
-        ),
-    ]
-
-
-def _mass_does_not_matter(results: Mapping[str, Result]) -> bool:
-    """Whether runs of both masses end where the calibration alone says, to a tenth of 10 mm."""
-    return _farthest(results) < 0.1 * TOLERANCE["position"]
-
-
-def _farthest(results: Mapping[str, Result]) -> float:
-    """Return how far the ends of vision-based runs are from those of statics at most [mm]."""
-    keys = [f"vbc-{n}" for n in TESTS] + [f"cameras-{n}" for n in VERIFIED_TESTS]
-    return max(
-        float(np.linalg.norm(results[key]["rest"][:3] - results[key]["predicted"][:3]))
-        for key in keys
-    )
 
 
 def _text(results: Mapping[str, Result], visions: dict[str, dict[str, Any]]) -> tuple[str, ...]:

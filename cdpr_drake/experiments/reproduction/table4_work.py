@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cdpr_drake.experiments.reproduction.assumptions import assumed
+from cdpr_drake.experiments.reproduction.assumptions import assumed, assumptions
 from cdpr_drake.experiments.reproduction.believed import Eyes, setup_from
 from cdpr_drake.experiments.reproduction.explanations import (
     EXPLANATIONS,
@@ -62,6 +62,9 @@ FEW = 4
 PAYLOADS = (0.0, 110.0, 200.0)
 """At Test 2's goal, to tell explanations apart [kg]."""
 
+MODULI = 21
+"""Values across the range of the modulus, to see what holds whichever is true."""
+
 SHIFT = 0.5
 """By which the poses are moved, as the camera's place is assumed [m]."""
 
@@ -80,9 +83,22 @@ def explain(index: int) -> Result:
         "values": dict(zip(explanation.free, values.tolist(), strict=True)),
         "left": left,
         "predictions": predictions(explanation),
-        "beyond": [float(joint_space_end(structure, 2, payload=m).position[2]) for m in PAYLOADS],
+        "beyond": _beyond(structure),
     }
     return result | _ends(structure)
+
+
+def moduli() -> Result:
+    """Return what `fitted_ends` has, for constant moduli all over their range, a row each."""
+    entry = assumptions("table4")["modulus"]
+    every = [
+        Structure(modulus=float(value)) for value in np.linspace(entry.low, entry.high, MODULI)
+    ]
+    return {
+        "modulus": np.array([structure.modulus for structure in every]),
+        "position": np.array([_ends(structure)["position"] for structure in every]),
+        "beyond": np.array([_beyond(structure) for structure in every]),
+    }
 
 
 def fitted_ends() -> Result:
@@ -101,7 +117,7 @@ def fitted_ends() -> Result:
     changed.append(["no run from drum to eyelet", *_two_numbers(without_run)])
     return {
         "left": data(nominal),
-        "beyond": [float(joint_space_end(structure, 2, payload=m).position[2]) for m in PAYLOADS],
+        "beyond": _beyond(structure),
         "changed": changed,
         **_ends(structure),
     }
@@ -257,6 +273,11 @@ def _error_of(done: Run, time: float) -> Array:
 
 def _flat(error: EndError) -> Array:
     return np.concatenate([error.position, error.orientation])
+
+
+def _beyond(structure: Structure) -> list[float]:
+    """Return z at Test 2's goal with each of `PAYLOADS` [mm]."""
+    return [float(joint_space_end(structure, 2, payload=m).position[2]) for m in PAYLOADS]
 
 
 def _ends(structure: Structure) -> dict[str, Any]:

@@ -9,7 +9,16 @@ import numpy as np
 
 from cdpr_drake.experiments.reproduction.assumptions import assumed, printed
 from cdpr_drake.experiments.reproduction.convergence import median_interval
-from cdpr_drake.experiments.reproduction.section import Case, Claim, Result, Section, Table
+from cdpr_drake.experiments.reproduction.section import Case, Result, Section, Table
+from cdpr_drake.experiments.reproduction.table5_claims import (
+    LEVEL,
+    NORM,
+    Z,
+    claims,
+    differences,
+    stacked,
+    unpaired,
+)
 from cdpr_drake.experiments.reproduction.table5_work import (
     CHANGES,
     LAST,
@@ -25,19 +34,7 @@ from cdpr_drake.model.rotations import Array
 
 name = "table5"
 
-LEVEL = LEVELS.index(0.02)
-"""Converged: at 2 % of the first error."""
-
-NORM, Z = 0, 1
-"""Rows of "converged": the position error's norm, and its z."""
-
-ACCURACY = (5.0, 0.1)
-"""Of the final errors with SCMWE [mm, deg]: the paper's are at most 4.48 mm and 0.08°."""
-
 CHANGED_TEST = 4
-
-LIKE = 2.0
-"""A convergence time difference is like the printed one if neither is this many times the other."""
 
 
 def cases() -> Sequence[Case]:
@@ -74,98 +71,17 @@ def section(results: Mapping[str, Result]) -> Section:
             _levels_table(pairs),
             _changes_table(results),
         ),
-        claims=(*_error_claims(pairs), *_time_claims(pairs)),
+        claims=claims(results, pairs),
         fitted=assumed(name),
     )
-
-
-def differences(pairs: Sequence[Result], number: int, what: str = "converged") -> Array:
-    """Return convergence times, SCMWE less SLSM, of runs alike in noise and calibration [s].
-
-    Args:
-        pairs: results of `pair`.
-        number: of the test.
-        what: "converged", without noise (pairs, 2, levels), or "noisy" (pairs, levels).
-    """
-    ours, straight = (_stacked(pairs, number, model, what) for model in MODELS)
-    return ours - straight
-
-
-def unpaired_spread(pairs: Sequence[Result], number: int) -> Array:
-    """Return how convergence times seen differ between runs with other noise and calibration.
-
-    Args:
-        pairs: results of `pair`.
-        number: of the test.
-
-    Returns:
-        (levels,) [s]: half the width of what 95 % of all differences between a run with SCMWE and
-        one with SLSM of another seed lie in.
-    """
-    ours, straight = (_stacked(pairs, number, model, "noisy") for model in MODELS)
-    every = ours[:, None] - straight[None]
-    other = every[~np.eye(len(pairs), dtype=bool)]
-    low, high = np.percentile(other, [2.5, 97.5], axis=0)
-    return np.asarray(0.5 * (high - low))
-
-
-def _stacked(pairs: Sequence[Result], number: int, model: str, what: str) -> Array:
-    return np.array([found[f"{number} {model}"][what] for found in pairs])
-
-
-def _error_claims(pairs: Sequence[Result]) -> list[Claim]:
-    paper, claims = printed(name), []
-    for number in TESTS:
-        theirs = paper[f"real_scmwe_test_{number}"].value
-        seen = _stacked(pairs, number, "SCMWE", "seen")
-        true = _stacked(pairs, number, "SCMWE", "true").max(axis=0)
-        most = seen.max(axis=0)
-        claims.append(
-            Claim(
-                text=f"final errors with SCMWE, Test {number}",
-                printed=f"{theirs[0]} mm, {theirs[1]}°",
-                ours=f"{seen[:, 0].mean():.1f} mm, {seen[:, 1].mean():.2f}°; at most "
-                f"{most[0]:.1f} mm, {most[1]:.2f}°",
-                agrees=bool(most[0] <= ACCURACY[0] and most[1] <= ACCURACY[1]),
-                reason="as the cameras see them, as in Fig. 13, noise and all; true ones at most "
-                f"{true[0]:.1f} mm, {true[1]:.2f}°",
-            )
-        )
-    return claims
-
-
-def _time_claims(pairs: Sequence[Result]) -> list[Claim]:
-    paper, claims = printed(name), []
-    for number in TESTS:
-        theirs = paper[f"delta_t_test_{number}"].value
-        median, low, high = median_interval(differences(pairs, number)[:, NORM, LEVEL])
-        interval = f"{1e3 * median:.1f} ms (95 %: {1e3 * low:.1f} to {1e3 * high:.1f})"
-        claims += [
-            Claim(
-                text=f"SCMWE converges no later than SLSM, Test {number}",
-                printed="faster",
-                ours=f"by {interval}",
-                agrees=median <= 0.0,
-                reason=f"median of {len(pairs)} pairs of runs, SCMWE less SLSM, to 2 % of the "
-                "first position error",
-            ),
-            Claim(
-                text=f"by how much, Test {number}",
-                printed=f"-{theirs} s",
-                ours=f"{median:.4f} s",
-                agrees=bool(-LIKE * theirs <= median <= -theirs / LIKE),
-                reason="at this size the models hardly differ; what could make seconds is below",
-            ),
-        ]
-    return claims
 
 
 def _errors_table(results: Mapping[str, Result], pairs: Sequence[Result]) -> Table:
     paper, rows = printed(name), []
     for number in TESTS:
         for model in MODELS:
-            seen = _stacked(pairs, number, model, "seen")
-            true = _stacked(pairs, number, model, "true")
+            seen = stacked(pairs, number, model, "seen")
+            true = stacked(pairs, number, model, "true")
             rows.append(
                 (
                     f"{model}, real robot, Test {number}",
@@ -242,7 +158,7 @@ def _levels_table(pairs: Sequence[Result]) -> Table:
     for number in TESTS:
         clean = differences(pairs, number)[:, NORM]
         noisy = differences(pairs, number, "noisy")
-        spread = unpaired_spread(pairs, number)
+        spread = _spread(pairs, number)
         for i, level in enumerate(LEVELS):
             rows.append(
                 (
@@ -260,6 +176,12 @@ def _levels_table(pairs: Sequence[Result]) -> Table:
             "different seeds, as two experiments are; 95 % of the differences are within this."
         ),
     )
+
+
+def _spread(pairs: Sequence[Result], number: int) -> Array:
+    """Return half the width (levels,) [s] of what 95 % of `unpaired` differences lie in."""
+    low, high = np.percentile(unpaired(pairs, number), [2.5, 97.5], axis=0)
+    return np.asarray(0.5 * (high - low))
 
 
 def _changes_table(results: Mapping[str, Result]) -> Table:
@@ -306,7 +228,7 @@ def _text(results: Mapping[str, Result], pairs: Sequence[Result]) -> tuple[str, 
         model: min(float(results[f"ideal-{n}"][f"{n} {model}"]["rates"][0]) for n in TESTS)
         for model in MODELS
     }
-    spread = max(float(unpaired_spread(pairs, n)[-1]) for n in TESTS)
+    spread = max(float(_spread(pairs, n)[-1]) for n in TESTS)
     return (
         f"Tests 4 and 5 with both models on the sampled loop: {len(pairs)} times with noise and "
         "one calibration each, as for Table 4, the two models alike in both; and once with "

@@ -15,6 +15,7 @@ from cdpr_drake.experiments.reproduction.large_robot import (
     setup_of_move,
 )
 from cdpr_drake.experiments.reproduction.section import Case, Result
+from cdpr_drake.experiments.reproduction.table7_claims import FAST_RAMP
 from cdpr_drake.experiments.reproduction.table7_section import section
 from cdpr_drake.experiments.reproduction.table7_variations import slow_errors, variations, vary
 from cdpr_drake.model.rotations import Array, as_pose
@@ -29,11 +30,11 @@ COARSE = {"linear_density": 0.065, "platform_scale": 1.01, "gain": 0.0594, "targ
 
 
 def cases() -> Sequence[Case]:
-    """Return the four simulations, two that start fast, the fit, and the variations."""
+    """Return the four simulations, four that start fast, the fit, and the variations."""
     moves = [Case(key=f"move_{m}", function=move, arguments={"cable_model": m}) for m in MODELS]
     fast = [
-        Case(key=f"fast_{m}", function=move, arguments={"cable_model": m, "ramp_time": 1.0})
-        for m in ("ECM", "SLSM")
+        Case(key=f"fast_{m}", function=move, arguments={"cable_model": m, "ramp_time": FAST_RAMP})
+        for m in MODELS
     ]
     varied = [Case(key=f"vary_{k}", function=vary, arguments={"key": k}) for k in variations()]
     return [*moves, *fast, Case(key="fit", function=fit), *varied]

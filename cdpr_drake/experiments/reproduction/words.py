@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 DIGITS = 3
@@ -45,11 +45,36 @@ def verdict(claim: Mapping[str, Any]) -> str:
     return "agrees" if claim["agrees"] else "differs"
 
 
+def how_often(claim: Mapping[str, Any]) -> str:
+    """Return which part of its null model's outcomes would meet a `claim`; "" if there is none."""
+    rate = claim["null_rate"]
+    return "" if rate is None else f"{100.0 * rate:.2g} %" if rate < 0.995 else "100 %"
+
+
+def what_else(claim: Mapping[str, Any]) -> str:
+    """Return what could have come out otherwise, and how much of that would meet a `claim`."""
+    often = how_often(claim)
+    return f"{claim['null']}: {often} would agree" if often else str(claim["null"])
+
+
+def tested(claims: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Return those of some `claims` that could have failed: the only ones that are counted."""
+    return [claim for claim in claims if claim["kind"] == "tested"]
+
+
 def count_of_claims(report: Mapping[str, Any]) -> str:
-    """Return in a sentence how many claims of a `report` hold."""
+    """Return in a sentence how many claims of a `report` hold, of those that could have failed."""
     claims = [claim for section in report["sections"] for claim in section["claims"]]
-    agree = sum(claim["agrees"] for claim in claims)
-    return f"{agree} of {len(claims)} claims agree, {len(claims) - agree} differ."
+    counted = tested(claims)
+    agree = sum(claim["agrees"] for claim in counted)
+    by_chance = sum(claim["null_rate"] for claim in counted)
+    kinds = [claim["kind"] for claim in claims]
+    return (
+        f"{agree} of {len(counted)} tested claims agree, where null models would meet "
+        f"{by_chance:.1f} on average; {kinds.count('fitted')} follow fits or choices and "
+        f"{kinds.count('by construction')} come out as they do by construction: these are not "
+        "counted."
+    )
 
 
 def fitted_and_assumed(section: Mapping[str, Any]) -> tuple[int, int]:
