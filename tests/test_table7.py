@@ -22,7 +22,7 @@ from cdpr_drake.experiments.reproduction.large_robot import (
     true_robot,
 )
 from cdpr_drake.experiments.reproduction.quasi_static import run_quasi_static
-from cdpr_drake.experiments.reproduction.table7_claims import excursions, one_for_three
+from cdpr_drake.experiments.reproduction.table7_claims import ALONG, excursions, one_for_three
 from cdpr_drake.experiments.reproduction.table7_variations import slow_errors, variations, vary
 from cdpr_drake.model.robot import load_robot
 from cdpr_drake.model.servo import ServoSettings
@@ -144,6 +144,16 @@ def test_a_run_holds_what_its_figure_needs(moves: dict[str, Any]) -> None:
     )
 
 
+def test_an_undamped_mode_grows_at_half_the_gain(values: dict[str, Any]) -> None:
+    """And drag of the size of the gain stops it; the simulations have more all along the way."""
+    for x in (0.0, 20.0):
+        found = table7.stability(x)
+        assert found["growth"] == pytest.approx(0.5 * values["gain"], rel=0.05)
+        assert found["drag"] == pytest.approx(values["gain"], rel=0.05)
+        assert found["drag"] < 0.6 * values["drag"]
+        assert found["damping_time"] > 100 * values["damping_time"]
+
+
 def test_times_of_arrival_of_an_exponential() -> None:
     time = np.linspace(0.0, 100.0, 201)
     error = np.exp(-0.05 * time)[:, None] * np.array([20.0, 0.0, 0.0])
@@ -176,6 +186,9 @@ def _results(final: np.ndarray, stray: float) -> dict[str, Any]:
     for key in variations():
         results[f"vary_{key}"] = {"errors": final, "failed": ""}
     results["vary_soft"] = {"errors": np.full((4, 2), np.nan), "failed": "slack"}
+    for x in ALONG:
+        stable = {"growth": 0.03, "frequency": 0.2, "drag": 0.06, "damping": 0.02}
+        results[f"stable_{x}"] = {**stable, "damping_time": 0.5 if x == 0 else np.inf}
     results["fit"] = {"values": {n: assumed("table7")[n] for n in table7.COARSE}, "errors": final}
     return results
 

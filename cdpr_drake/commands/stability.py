@@ -13,7 +13,14 @@ from cdpr_drake.commands.arguments import UsageError
 from cdpr_drake.commands.kernels import compilation_announced
 from cdpr_drake.commands.place import as_file_name, in_words, place, pose_values
 from cdpr_drake.errors import CdprError
-from cdpr_drake.study import GainLimit, StabilityMap, gain_limit, stability_map
+from cdpr_drake.study import (
+    GainBand,
+    GainLimit,
+    StabilityMap,
+    gain_limit,
+    gain_limit_band,
+    stability_map,
+)
 
 
 def stability_command(options: argparse.Namespace) -> int:
@@ -36,6 +43,7 @@ def stability_command(options: argparse.Namespace) -> int:
         law = {"cable_model": options.cable_model}
         with compilation_announced():
             limit = gain_limit(robot, pose, latency, period, **law)
+            band = gain_limit_band(robot, pose, latency, period, **law)
             found = _map(options, robot, pose, period, law) if options.map else None
     except (CdprError, ValueError) as error:
         raise UsageError(str(error)) from error
@@ -50,8 +58,9 @@ def stability_command(options: argparse.Namespace) -> int:
         "sample_time_s": period,
         "latency_s": latency,
         **_limit(limit),
+        "band": _band(band),
     }
-    lines = [*wrapped(head), "", *wrapped(_sentence(limit))]
+    lines = [*wrapped(head), "", *wrapped(_sentence(limit)), *wrapped(_band_sentence(band))]
     if found is not None:
         summary["map"] = {
             "gains_per_s": found.gains.tolist(),
@@ -101,6 +110,19 @@ def _limit(limit: GainLimit) -> dict[str, Any]:
         "unstable_gains_per_s": [list(span) for span in limit.unstable],
         "searched_up_to_per_s": limit.searched,
     }
+
+
+def _band(band: GainBand) -> dict[str, Any]:
+    """Return a band as plain values."""
+    return {
+        "loss_factors": list(band.loss_factors),
+        "damping_times_s": list(band.damping_times),
+        "limits": [_limit(limit) for limit in band.limits],
+    }
+
+
+def _band_sentence(band: GainBand) -> str:
+    return f"The damping of the cables is not known: {band}."
 
 
 def _sentence(limit: GainLimit) -> str:

@@ -7,7 +7,8 @@ that stretch them; where sagging cables give way by their sag hardly anything do
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable
 
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, Diagram, DiagramBuilder, LeafSystem
@@ -82,32 +83,45 @@ def _with_drag(loop: Diagram, drag: PlatformDrag) -> Diagram:
     return builder.Build()
 
 
-def growth(robot: CableRobot, pose: RigidTransform, gain: float, drag: float = 0.0) -> complex:
-    """Return ln(z)/T [1/s] of the sampled loop's eigenvalue z that grows most, with drag.
+def what_it_takes(robot: CableRobot, pose: RigidTransform, gain: float) -> dict[str, float]:
+    """Return what keeps the sampled loop stable at a goal, and how unstable it is without drag.
+
+    The result holds growth [1/s] of the fastest growing mode without drag, its frequency [Hz], the
+    least drag [1/s] with which none grows, the damping [-] that gives that mode by itself, and the
+    least damping_time [s] of the cables that would do in its place, infinite above 10 s.
 
     Args:
         robot: the robot, which believes itself.
         pose: X_WP of the goal.
         gain: lambda [1/s].
-        drag: on the platform [1/s].
     """
     cameras = robot.cameras
-    servo = SampledServo(robot, pose, cameras.sample_time, drag=drag)
-    return servo.growth(gain, cameras.latency)
+
+    def grows(damping_time: float, drag: float) -> complex:
+        damped = robot.replace(cable=robot.cable.replace(damping_time=damping_time))
+        servo = SampledServo(damped, pose, cameras.sample_time, drag=drag)
+        return servo.growth(gain, cameras.latency)
+
+    own = robot.cable.damping_time
+    without = grows(own, 0.0)
+    drag = _least(lambda d: grows(own, d).real, 1.0)
+    return {
+        "growth": without.real,
+        "frequency": abs(without) / (2.0 * math.pi),
+        "drag": drag,
+        "damping": 0.5 * drag / abs(without),
+        "damping_time": _least(lambda t: grows(t, 0.0).real, 10.0),
+    }
 
 
-def least_drag(robot: CableRobot, poses: Sequence[RigidTransform], gain: float) -> float:
-    """Return the least drag [1/s] with which the sampled loop is stable at all poses.
-
-    Args:
-        robot: the robot.
-        poses: X_WP of goals.
-        gain: lambda [1/s].
-    """
-    low, high = 0.0, 1.0
+def _least(growth: Callable[[float], float], highest: float) -> float:
+    """Return the least value with which nothing grows, to 0.1 %; infinite above the `highest`."""
+    if growth(highest) > 0.0:
+        return math.inf
+    low, high = 0.0, highest
     while high - low > 1e-3 * high:
         middle = 0.5 * (low + high)
-        if max(growth(robot, pose, gain, middle).real for pose in poses) > 0.0:
+        if growth(middle) > 0.0:
             low = middle
         else:
             high = middle

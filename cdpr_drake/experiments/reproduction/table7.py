@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from pydrake.math import RigidTransform
 
 from cdpr_drake.experiments.reproduction.assumptions import assumed, assumptions
-from cdpr_drake.experiments.reproduction.drag import run_with_drag
+from cdpr_drake.experiments.reproduction.drag import run_with_drag, what_it_takes
 from cdpr_drake.experiments.reproduction.large_robot import (
     GOAL,
     MODELS,
     printed_errors,
     setup_of_move,
+    true_robot,
 )
 from cdpr_drake.experiments.reproduction.section import Case, Result
-from cdpr_drake.experiments.reproduction.table7_claims import FAST_RAMP
+from cdpr_drake.experiments.reproduction.table7_claims import ALONG, FAST_RAMP
 from cdpr_drake.experiments.reproduction.table7_section import section
 from cdpr_drake.experiments.reproduction.table7_variations import slow_errors, variations, vary
 from cdpr_drake.model.rotations import Array, as_pose
@@ -30,14 +32,25 @@ COARSE = {"linear_density": 0.065, "platform_scale": 1.01, "gain": 0.0594, "targ
 
 
 def cases() -> Sequence[Case]:
-    """Return the four simulations, four that start fast, the fit, and the variations."""
+    """Return four simulations, four that start fast, the fit, variations, and places on the way."""
     moves = [Case(key=f"move_{m}", function=move, arguments={"cable_model": m}) for m in MODELS]
     fast = [
         Case(key=f"fast_{m}", function=move, arguments={"cable_model": m, "ramp_time": FAST_RAMP})
         for m in MODELS
     ]
     varied = [Case(key=f"vary_{k}", function=vary, arguments={"key": k}) for k in variations()]
-    return [*moves, *fast, Case(key="fit", function=fit), *varied]
+    stable = [Case(key=f"stable_{x}", function=stability, arguments={"x": float(x)}) for x in ALONG]
+    return [*moves, *fast, Case(key="fit", function=fit), *varied, *stable]
+
+
+def stability(x: float) -> Result:
+    """Return how unstable the loop is at a goal on the way, and what would keep it stable.
+
+    Args:
+        x: of the goal [m], which is level with START and GOAL.
+    """
+    values = assumed(name)
+    return what_it_takes(true_robot(values), RigidTransform([x, 0.0, 0.0]), values["gain"])
 
 
 def move(cable_model: str, ramp_time: float | None = None) -> Result:

@@ -29,6 +29,9 @@ WITHIN = 1.5
 FAST_RAMP = 1.0
 """Of the moves that start fast [s]."""
 
+ALONG = (0, 5, 10, 15, 20)
+"""Places along x on the way of the move, whose stability is looked into [m]."""
+
 FARTHER = 5.0
 """The SLSM strays, and the others do not, if it strays so many times as far."""
 
