@@ -1,0 +1,111 @@
+"""Write the table of docs/damping.md: gain limits and damping before and after a correction.
+
+    python docs/make_damping.py
+
+Version 0.1's numbers are kept in docs/damping_before.json; the others are computed.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydrake.math import RigidTransform
+
+from cdpr_drake.experiments.moves import move_near_the_middle
+from cdpr_drake.experiments.paper_tests import paper_test, paper_tests
+from cdpr_drake.model.robot import CableRobot, load_robot
+from cdpr_drake.study import gain_limit, gain_limit_band, platform_modes
+
+DOCS = Path(__file__).resolve().parent
+PAGE, BEFORE = DOCS / "damping.md", DOCS / "damping_before.json"
+BEGIN, END = "<!-- begin limits -->\n", "<!-- end limits -->"
+
+TESTS = ((1, 0), (1, 1), (2, 1), (3, 0), (3, 1), (4, 0), (4, 1), (5, 1))
+"""Number of the test, and 0 for its start or 1 for its goal; others share these starts."""
+
+ENDS = ("start", "goal")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """A robot at a pose, by the name of both."""
+
+    robot_name: str
+    name: str
+    robot: CableRobot
+    pose: RigidTransform
+
+
+def places() -> Iterator[Place]:
+    """Yield all rows of the table: the paper's on CoGiRo, moves near the middle, Table 7's ends."""
+    cogiro = load_robot(paper_tests().robot)
+    for number, end in TESTS:
+        test = paper_test(number)
+        yield Place(
+            robot_name=cogiro.name,
+            name=f"Test {number}, {ENDS[end]}",
+            robot=test.carried_by(cogiro),
+            pose=test.poses(cogiro)[end],
+        )
+    for name in ("cogiro-22m", "cogiro-37m", "cogiro-98m"):
+        robot = load_robot(name)
+        for end, pose in zip(ENDS, move_near_the_middle(robot), strict=True):
+            yield Place(robot_name=name, name=f"near the middle, {end}", robot=robot, pose=pose)
+    for end, x in zip(ENDS, (0.0, 20.0), strict=True):
+        pose = RigidTransform([x, 0.0, 0.0])
+        yield Place(robot_name="cogiro-98m", name=f"Table 7, {end}", robot=robot, pose=pose)
+
+
+def numbers(place: Place) -> dict[str, float]:
+    """Return gain limit [1/s], its band, the critical frequency [Hz], and the least damping [-]."""
+    limit = gain_limit(place.robot, place.pose)
+    band = gain_limit_band(place.robot, place.pose)
+    modes = platform_modes(place.robot, place.pose).modes
+    return {
+        "limit": limit.gain,
+        "lowest": band.lowest,
+        "highest": band.highest,
+        "frequency": limit.frequency,
+        "damping": min(mode.damping for mode in modes if mode.frequency > 0.0),
+    }
+
+
+def line(place: Place, before: list[dict[str, Any]]) -> str:
+    """Return a row of the table in Markdown.
+
+    Args:
+        place: of the row.
+        before: what version 0.1 found, all places.
+    """
+    (old,) = (
+        row for row in before if (row["robot"], row["place"]) == (place.robot_name, place.name)
+    )
+    new = numbers(place)
+    cells = (
+        place.robot_name, place.name, f"{old['limit']:.3g}", f"{new['limit']:.3g}",
+        f"{new['lowest']:.2g} to {new['highest']:.2g}", f"{new['frequency']:.2g}",
+        f"{100.0 * old['damping']:.2g}", f"{100.0 * new['damping']:.2g}",
+    )  # fmt: skip
+    return "| " + " | ".join(cells) + " |"
+
+
+def main() -> None:
+    """Fill the page."""
+    before = json.loads(BEFORE.read_text(encoding="utf-8"))
+    page = PAGE.read_text(encoding="utf-8")
+    head, rest = page.split(BEGIN)
+    table = [
+        "| robot | where | limit before [1/s] | now [1/s] | band [1/s] | at [Hz] "
+        "| least damping before [%] | now [%] |",
+        "|---|---|---:|---:|---:|---:|---:|---:|",
+        *(line(place, before) for place in places()),
+    ]
+    PAGE.write_text(head + BEGIN + "\n".join(table) + "\n" + END + rest.split(END)[1], "utf-8")
+
+
+if __name__ == "__main__":
+    main()
