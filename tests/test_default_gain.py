@@ -1,0 +1,174 @@
+"""The gain of a loop where nobody asks for one: the file's, the customary, or half the limit."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydrake.math import RigidTransform, RotationMatrix
+
+from cdpr_drake.diagrams import make_vision_based_control
+from cdpr_drake.experiments import Setup, paper_test, prepare
+from cdpr_drake.experiments.moves import move_near_the_middle
+from cdpr_drake.experiments.runs import doubt_about_gain
+from cdpr_drake.model.robot import CableRobot, load_robot
+from cdpr_drake.model.servo import CUSTOMARY_GAIN
+from cdpr_drake.study import default_gain, gain_limit, lowest_gain
+from cdpr_drake.study.default_gain import _rounded_down
+from cdpr_drake.study.stability import StabilityWarning
+
+SIZES = ("cogiro", "cogiro-22m", "cogiro-37m", "cogiro-98m")
+
+
+def damped(robot: CableRobot, factor: float) -> CableRobot:
+    """Return a robot whose cables are damped so many times as much."""
+    cable = robot.cable
+    return robot.replace(cable=cable.replace(damping_time=factor * cable.damping_time))
+
+
+@pytest.fixture
+def large() -> CableRobot:
+    """Return a robot on which the limit decides, whatever the large one's damping is."""
+    return damped(load_robot("cogiro-98m"), 0.1)
+
+
+@pytest.mark.parametrize("model", ["SCMWE", "SLSM"])
+@pytest.mark.parametrize("factor", [1.0, 0.1])
+@pytest.mark.parametrize("name", SIZES)
+def test_the_gain_is_the_customary_one_or_half_the_limit(
+    name: str, factor: float, model: str
+) -> None:
+    robot = damped(load_robot(name), factor)
+    _, goal = move_near_the_middle(robot)
+    limit = gain_limit(robot, goal, cable_model=model).gain
+    found = default_gain(robot, goal, model)
+    if limit == 0.0:  # no gain is stable
+        assert (found.gain, found.decided_by) == (CUSTOMARY_GAIN, "custom")
+        return
+    assert found.gain <= 0.5 * limit * (1.0 + 1e-6)
+    assert found.gain == CUSTOMARY_GAIN or found.gain > 0.5 * limit / 1.11
+    assert found.decided_by == ("custom" if limit >= 2.0 * CUSTOMARY_GAIN else "limit")
+    if found.decided_by == "limit":
+        assert found.limit is not None and found.limit.gain == pytest.approx(limit, rel=1e-5)
+        assert found.reason() == f"half the limit of {limit:.2g} 1/s at the goal"
+        assert found.to_dict()["gain_limit_per_s"] == pytest.approx(limit, rel=1e-5)
+    else:
+        assert found.reason() == ""
+
+
+def test_on_cogiro_the_customary_gain_stands_at_every_goal(cogiro: CableRobot) -> None:
+    for number in range(1, 6):
+        test = paper_test(number)
+        found = default_gain(test.carried_by(cogiro), test.poses(cogiro)[1])
+        assert (found.gain, found.decided_by) == (0.1, "custom")
+
+
+def test_a_file_s_gain_wins(large: CableRobot) -> None:
+    start, goal = move_near_the_middle(large)
+    for gain in (0.02, 0.7):
+        found = default_gain(large.replace(gain=gain), goal)
+        assert (found.gain, found.decided_by, found.limit) == (gain, "robot file", None)
+        assert found.reason() == "as the robot file says"
+    for controller in ("VBC", "JSC"):
+        named = large.replace(gain=0.7)
+        assert Setup(robot=named, start=start, goal=goal, controller=controller).gain == 0.7
+
+
+def test_timing_and_law_are_heeded(large: CableRobot) -> None:
+    _, goal = move_near_the_middle(large)
+    late = default_gain(large, goal, latency=0.0)
+    assert late.gain <= 0.5 * gain_limit(large, goal, latency=0.0).gain * (1.0 + 1e-6)
+    continuous = default_gain(large, goal, sample_time=None)
+    assert {late.gain, continuous.gain}.isdisjoint({default_gain(large, goal).gain})
+    assert default_gain(large, goal, latency=0.7).decided_by == "custom"  # no prediction
+    share = default_gain(large, goal, customary=0.3, share=0.6)
+    assert share.limit is not None and share.gain == _rounded_down(0.6 * share.limit.gain)
+    assert share.reason("here") == f"0.6 of the limit of {share.limit.gain:.2g} 1/s here"
+    with pytest.raises(ValueError, match="latency"):
+        default_gain(large, goal, latency=-0.1)
+    with pytest.raises(ValueError, match="cables in the robot believed"):
+        default_gain(large, goal, believed=_with_seven_cables(large))
+
+
+def test_where_a_robot_cannot_rest_the_customary_gain_stands(cogiro: CableRobot) -> None:
+    for place in ([50.0, 0.0, 1.0], cogiro.drawing_points[0]):
+        found = default_gain(cogiro, [0.0, 0.0, 0.0, *place])
+        assert (found.gain, found.decided_by, found.limit) == (CUSTOMARY_GAIN, "custom", None)
+
+
+def test_where_no_gain_is_stable_the_customary_one_stands_and_is_warned_of(
+    cogiro: CableRobot,
+) -> None:
+    _, goal = move_near_the_middle(cogiro)
+    # A camera believed to stand at the other side of the goal: the law turns away from it.
+    X_WG = RigidTransform(goal.translation())
+    turn = X_WG @ RigidTransform(RotationMatrix.MakeZRotation(np.pi), np.zeros(3)) @ X_WG.inverse()
+    cameras = cogiro.cameras.replace(X_WF=turn @ cogiro.cameras.X_WF)
+    believed = cogiro.replace(cameras=cameras)
+    seen = turn @ goal
+    found = default_gain(cogiro, seen, believed=believed)
+    assert found.gain == CUSTOMARY_GAIN and found.decided_by == "custom"
+    assert found.limit is not None and found.limit.gain == 0.0
+    setup = Setup(robot=cogiro, start=goal, goal=seen, calibrated=believed)
+    assert "above the limit predicted at the goal, 0/s" in doubt_about_gain(setup)
+
+
+def test_of_several_the_lowest_is_good_for_all(large: CableRobot) -> None:
+    _, goal = move_near_the_middle(large)
+    found = [default_gain(large, goal, model) for model in ("SLSM", "SCMWE", "ECM")]
+    assert lowest_gain(found).gain == min(one.gain for one in found)
+
+
+def test_a_setup_without_a_gain_chooses_one(large: CableRobot) -> None:
+    start, goal = move_near_the_middle(large)
+    setup = Setup(robot=large, start=start, goal=goal, noise=False)
+    assert setup.chosen is not None and setup.chosen.decided_by == "limit"
+    assert setup.gain == setup.chosen.gain == default_gain(large, goal).gain
+    assert setup.replace(until=3.0).gain == setup.gain
+    assert setup.replace(until=3.0).chosen is None  # the copy was told its gain
+    given = Setup(robot=large, start=start, goal=goal, gain=0.1)
+    assert given.chosen is None and "above the limit" in doubt_about_gain(given)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", StabilityWarning)
+        prepare(setup)
+
+
+def test_a_setup_looks_for_its_limit_once(large: CableRobot, monkeypatch: Any) -> None:
+    from cdpr_drake.experiments import runs
+
+    start, goal = move_near_the_middle(large)
+    setup = Setup(robot=large, start=start, goal=goal)
+    monkeypatch.setattr(runs, "predicted_limit", None)
+    assert doubt_about_gain(setup) == ""
+
+
+def test_a_loop_takes_the_robot_s_gain_or_the_customary_one(cogiro: CableRobot) -> None:
+    def gain(robot: CableRobot, **given: float) -> float:
+        loop = make_vision_based_control(robot, **given)  # type: ignore[arg-type]
+        settings: Any = loop.GetSubsystemByName("servo")
+        return float(settings.settings.gain)
+
+    assert gain(cogiro) == CUSTOMARY_GAIN
+    assert gain(cogiro.replace(gain=0.03)) == 0.03
+    assert gain(cogiro.replace(gain=0.03), gain=0.2) == 0.2
+
+
+@given(st.floats(1e-6, 1e3))
+def test_rounding_never_rounds_up(value: float) -> None:
+    rounded = _rounded_down(value)
+    assert 0.9 * value < rounded <= value
+    assert np.isclose(float(f"{rounded:.2g}"), rounded, rtol=1e-15)
+
+
+def _with_seven_cables(robot: CableRobot) -> CableRobot:
+    return robot.replace(
+        drawing_points=robot.drawing_points[:7],
+        attachment_points=robot.attachment_points[:7],
+        cable=robot.cable.replace(drum_run=1.0),
+        winch=robot.winch.replace(encoder_zero_length=0.0),
+        load_cells=robot.load_cells.replace(bias=0.0, gain=1.0),
+    )
