@@ -51,7 +51,9 @@ def test_sensors_are_taken_away_one_kind_at_a_time(cogiro: CableRobot) -> None:
 @pytest.mark.parametrize("name", ["cogiro", "cogiro-98m"])
 def test_the_gain_keeps_away_from_its_limit(name: str) -> None:
     robot = load_robot(name)
-    gain = suitable_gain(robot)
+    found = suitable_gain(robot)
+    gain = found.gain
+    assert found.decided_by == ("custom" if gain == 0.3 else "limit")
     goal = ablation_setup(robot, sensor_sets(robot)[0], 0, gain).goal
     limit = gain_limit(robot, goal, robot.cameras.latency, robot.cameras.sample_time).gain
     assert gain <= 0.3 and gain < 0.65 * limit

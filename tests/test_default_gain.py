@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 import warnings
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,12 +14,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydrake.math import RigidTransform, RotationMatrix
 
+from cdpr_drake.__main__ import main
+from cdpr_drake.commands.arguments import parse
+from cdpr_drake.commands.plan import describe, plan
 from cdpr_drake.diagrams import make_vision_based_control
 from cdpr_drake.experiments import Setup, paper_test, prepare
 from cdpr_drake.experiments.moves import move_near_the_middle
 from cdpr_drake.experiments.runs import doubt_about_gain
-from cdpr_drake.model.robot import CableRobot, load_robot
+from cdpr_drake.model.robot import CableRobot, load_robot, save_robot
 from cdpr_drake.model.servo import CUSTOMARY_GAIN
+from cdpr_drake.show.explorer import Explorer
 from cdpr_drake.study import default_gain, gain_limit, lowest_gain
 from cdpr_drake.study.default_gain import _rounded_down
 from cdpr_drake.study.stability import StabilityWarning
@@ -172,3 +179,132 @@ def _with_seven_cables(robot: CableRobot) -> CableRobot:
         winch=robot.winch.replace(encoder_zero_length=0.0),
         load_cells=robot.load_cells.replace(bias=0.0, gain=1.0),
     )
+
+
+# --- on the command line
+
+
+@pytest.fixture
+def robot_file(tmp_path: Path, large: CableRobot, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Write the robot on which the limit decides, changed or not, and return the file's name."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "400")
+
+    def write(**changes: Any) -> str:
+        save_robot(large.replace(**changes), tmp_path / "mine.yaml")
+        return "mine.yaml"
+
+    return write
+
+
+RUN = ("run", "--until", "0.1", "--no-figures", "--no-replay")
+
+
+def told(capsys: pytest.CaptureFixture[str], *argv: str) -> tuple[str, dict[str, Any]]:
+    """Return what a command prints on stdout, and its summary."""
+    assert main([*argv, "--output", "out"]) == 0
+    return capsys.readouterr().out, json.loads(Path("out/summary.json").read_text())
+
+
+@pytest.mark.parametrize("models", ["SCMWE,SLSM", "SLSM", "ECM"])
+def test_a_run_tells_that_the_limit_decided(
+    capsys: pytest.CaptureFixture[str], robot_file: Any, large: CableRobot, models: str
+) -> None:
+    text, summary = told(capsys, *RUN, "--robot", robot_file(), "--cable-model", models)
+    _, goal = move_near_the_middle(large)
+    limit = min(gain_limit(large, goal, cable_model=m).gain for m in models.split(","))
+    gain = summary["gain_per_s"]
+    assert 0.45 * limit < gain <= 0.5 * limit * (1.0 + 1e-6)
+    assert summary["gain_decided_by"] == "limit"
+    assert summary["gain_limit_per_s"] == pytest.approx(limit, rel=1e-5)
+    assert f"lambda = {gain:g} 1/s (half the limit of {limit:.2g} 1/s at the goal)" in text
+
+
+def test_a_run_tells_that_the_file_decided(
+    capsys: pytest.CaptureFixture[str], robot_file: Any
+) -> None:
+    text, summary = told(capsys, *RUN, "--robot", robot_file(gain=0.01))
+    assert (summary["gain_per_s"], summary["gain_decided_by"]) == (0.01, "robot file")
+    assert "lambda = 0.01 1/s (as the robot file says)" in text
+    # Too high a gain of the file is taken, and warned of, as one that was asked for.
+    assert main([*RUN, "--robot", robot_file(gain=0.4)]) == 0
+    streams = capsys.readouterr()
+    assert "lambda = 0.4 1/s" in streams.out and "above the limit predicted" in streams.err
+
+
+def test_a_gain_asked_for_is_taken_as_it_is(
+    capsys: pytest.CaptureFixture[str], robot_file: Any
+) -> None:
+    text, summary = told(capsys, *RUN, "--robot", robot_file(gain=0.01), "--gain", "0.3")
+    assert (summary["gain_per_s"], summary["gain_decided_by"]) == (0.3, "option")
+    assert "lambda = 0.3 1/s, " in text and summary["gain_limit_per_s"] is None
+
+
+def test_a_bad_gain_in_a_file_is_refused_by_name(
+    capsys: pytest.CaptureFixture[str], robot_file: Any
+) -> None:
+    file = Path(robot_file())
+    for gain in ("0", "-1", ".nan", ".inf", "fast"):
+        robot_file()
+        file.write_text(f"{file.read_text()}gain: {gain}\n")
+        assert main([*RUN, "--robot", "mine.yaml"]) == 2
+        assert "mine.yaml: gain: must be a" in capsys.readouterr().err.replace("positive", "a")
+
+
+def test_the_demo_heeds_the_rule_and_a_test_asked_for_keeps_its_own(
+    cogiro: CableRobot,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    save_robot(damped(cogiro, 0.0).replace(gain=0.07), "mine.yaml")
+    argv = (*RUN, "--robot", "mine.yaml", "--controller", "vbc")
+    _, demo = told(capsys, *argv)
+    assert (demo["name"], demo["gain_per_s"]) == ("test-4", 0.07)
+    _, test = told(capsys, *argv, "--test", "4")
+    assert (test["gain_per_s"], test["gain_decided_by"]) == (0.1, "test")
+    assert paper_test(4).gain == CUSTOMARY_GAIN  # else the demo were another
+    _, cogiros = told(capsys, *RUN, "--controller", "vbc")
+    assert (cogiros["gain_per_s"], cogiros["gain_decided_by"]) == (0.1, "custom")
+
+
+def test_a_slow_gain_has_the_time_it_needs(robot_file: Any) -> None:
+    def until(**changes: Any) -> float:
+        return plan(parse(["run", "--robot", robot_file(**changes)])).setups[0].until
+
+    assert until(gain=0.05) == 160.0
+    assert until(gain=0.003) == 400.0
+    found = plan(parse(["run", "--robot", robot_file(gain=0.003)]))
+    assert "It ends after 1.2 of the gain's time constants" in describe(
+        found.name, found.setups[0], found.chosen
+    )
+    assert plan(parse(["run", "--robot", "cogiro-22m", "--gain", "0.05"])).setups[0].until == 80.0
+
+
+@pytest.mark.parametrize("command", ["linearize", "coupling", "sweep"])
+def test_other_commands_tell_it_too(
+    command: str, capsys: pytest.CaptureFixture[str], robot_file: Any
+) -> None:
+    more = {
+        "sweep": ["--cases", "1", "--jobs", "1", "--until", "0.1", "--payload", "0,50"],
+        "coupling": ["--cable-model", "ECM,SLSM"],
+    }
+    argv = [command, *more.get(command, []), "--no-figures"]
+    text, summary = told(capsys, *argv, "--robot", robot_file())
+    gain, limit = summary["gain_per_s"], summary["gain_limit_per_s"]
+    assert summary["gain_decided_by"] == "limit" and 0.45 * limit < gain <= 0.5 * limit
+    assert f"lambda = {gain:g} 1/s (half the limit of {limit:.2g} 1/s " in text
+    shutil.rmtree("out")
+    text, summary = told(capsys, *argv, "--robot", robot_file(gain=0.01))
+    assert (summary["gain_per_s"], summary["gain_decided_by"]) == (0.01, "robot file")
+    assert "lambda = 0.01 1/s (as the robot file says)" in text
+
+
+def test_the_explorer_begins_with_it(large: CableRobot) -> None:
+    for gain in (0.0031, 0.031, 0.1, 0.7):
+        explorer = Explorer(large, move_near_the_middle(large)[1], gain=gain)
+        try:
+            assert explorer.snapshot.gain == pytest.approx(gain, rel=1e-9)
+        finally:
+            explorer.close()

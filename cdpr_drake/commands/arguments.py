@@ -152,7 +152,11 @@ def _add_run(commands: argparse._SubParsersAction[_Parser]) -> None:
         "--cable-model", type=parse_models, action="extend", metavar="MODEL,...",
         help="of VBC: ECM, CMWE, SCMWE, SLSM; one run each (default: SCMWE,SLSM)",
     )  # fmt: skip
-    how.add_argument("--gain", type=float, metavar="PER_S", help="lambda [1/s]")
+    how.add_argument(
+        "--gain", type=float, metavar="PER_S",
+        help="lambda [1/s] (default: that of --test; else the robot file's; else 0.1, or half the "
+        "limit at the goal if that is less)",
+    )  # fmt: skip
     how.add_argument(
         "--sample-time", type=float, metavar="S",
         help="of the vision loop (default: the robot's); 0: all continuous, no latency",
@@ -177,7 +181,11 @@ def _add_run(commands: argparse._SubParsersAction[_Parser]) -> None:
     )  # fmt: skip
     how.add_argument("--no-noise", action="store_true", help="perfect cameras and load cells")
     how.add_argument("--seed", type=int, default=0, metavar="N", help="of the noise (default: 0)")
-    how.add_argument("--until", type=float, metavar="S", help="time to run")
+    how.add_argument(
+        "--until", type=float, metavar="S",
+        help="time to run (default: the test's, or 80; eight time constants of a gain that robot "
+        "file or limit decide, at most 400)",
+    )  # fmt: skip
 
     out = run.add_argument_group("what comes out")
     out.add_argument(

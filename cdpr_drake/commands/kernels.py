@@ -53,7 +53,7 @@ def compile_ahead() -> None:
     from cdpr_drake.experiments import prepare
 
     with compilation_announced():
-        for setup in plan(parse(["run"]))[1]:
+        for setup in plan(parse(["run"])).setups:
             prepare(setup)
 
 
