@@ -6,7 +6,7 @@ import argparse
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from cdpr_drake import __version__
 
@@ -144,7 +144,17 @@ def _add_run(commands: argparse._SubParsersAction[_Parser]) -> None:
             help=f"the platform's {text}: position [m]; roll, pitch, yaw [deg], level if left out",
         )  # fmt: skip
 
-    how = run.add_argument_group("how it is controlled")
+    _add_control(run.add_argument_group("how it is controlled"))
+    out = run.add_argument_group("what comes out")
+    out.add_argument(
+        "--output", type=Path, metavar="DIR", help="(default: a directory in ./out, which it names)"
+    )
+    out.add_argument("--json", action="store_true", help="print the summary as JSON, nothing else")
+    out.add_argument("--no-figures", action="store_true", help="write no figures")
+    out.add_argument("--no-replay", action="store_true", help="write no replay")
+
+
+def _add_control(how: Any) -> None:
     how.add_argument(
         "--controller", choices=("vbc", "jsc", "both"), default="both", help="(default: both)"
     )
@@ -186,11 +196,3 @@ def _add_run(commands: argparse._SubParsersAction[_Parser]) -> None:
         help="time to run (default: the test's, or 80; eight time constants of a gain that robot "
         "file or limit decide, at most 400)",
     )  # fmt: skip
-
-    out = run.add_argument_group("what comes out")
-    out.add_argument(
-        "--output", type=Path, metavar="DIR", help="(default: a directory in ./out, which it names)"
-    )
-    out.add_argument("--json", action="store_true", help="print the summary as JSON, nothing else")
-    out.add_argument("--no-figures", action="store_true", help="write no figures")
-    out.add_argument("--no-replay", action="store_true", help="write no replay")
