@@ -26,7 +26,7 @@ from cdpr_drake.model.servo import CUSTOMARY_GAIN
 from cdpr_drake.show.explorer import Explorer
 from cdpr_drake.study import default_gain, gain_limit, lowest_gain
 from cdpr_drake.study.default_gain import _rounded_down
-from cdpr_drake.study.stability import StabilityWarning
+from cdpr_drake.study.stability import SampledServo, StabilityWarning
 
 SIZES = ("cogiro", "cogiro-22m", "cogiro-37m", "cogiro-98m")
 
@@ -53,8 +53,8 @@ def test_the_gain_is_the_customary_one_or_half_the_limit(
     _, goal = move_near_the_middle(robot)
     limit = gain_limit(robot, goal, cable_model=model).gain
     found = default_gain(robot, goal, model)
-    if limit == 0.0:  # no gain is stable
-        assert (found.gain, found.decided_by) == (CUSTOMARY_GAIN, "custom")
+    if limit == 0.0:  # or below where the search of gain_limit begins
+        assert found.gain < 0.5e-3 and found.decided_by == "limit"
         return
     assert found.gain <= 0.5 * limit * (1.0 + 1e-6)
     assert found.gain == CUSTOMARY_GAIN or found.gain > 0.5 * limit / 1.11
@@ -65,6 +65,23 @@ def test_the_gain_is_the_customary_one_or_half_the_limit(
         assert found.to_dict()["gain_limit_per_s"] == pytest.approx(limit, rel=1e-5)
     else:
         assert found.reason() == ""
+
+
+def test_the_gain_follows_its_limit_down_to_hardly_any_damping(large: CableRobot) -> None:
+    """A large robot may have a limit below where `gain_limit` begins to look."""
+    gains = []
+    for factor in (1.0, 0.1, 1e-2, 0.0):
+        robot = damped(large, factor)
+        _, goal = move_near_the_middle(robot)
+        found = default_gain(robot, goal)
+        servo = SampledServo(robot, goal)
+        assert found.limit is not None and found.decided_by == "limit"
+        assert servo.growth(0.999 * found.limit.gain, 0.04).real < 0.0
+        assert servo.growth(1.001 * found.limit.gain, 0.04).real > 0.0
+        assert servo.growth(found.gain, 0.04).real < 0.0
+        assert found.limit.unstable[0][0] == found.limit.gain and found.limit.mode
+        gains.append(found.gain)
+    assert gains == sorted(gains, reverse=True) and 0.0 < gains[-1] < 0.5e-3
 
 
 def test_on_cogiro_the_customary_gain_stands_at_every_goal(cogiro: CableRobot) -> None:

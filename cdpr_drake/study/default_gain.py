@@ -7,6 +7,7 @@ below.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -21,7 +22,7 @@ from cdpr_drake.errors import CdprError, PredictionError
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, pose_to_vector
 from cdpr_drake.model.servo import CUSTOMARY_GAIN
-from cdpr_drake.study.stability import GainLimit, SampledServo, find_gain_limit
+from cdpr_drake.study.stability import LOWEST_GAIN, GainLimit, SampledServo, find_gain_limit
 
 SHARE_OF_LIMIT = 0.5
 """The most that a gain is of its limit unless somebody asks for more."""
@@ -31,6 +32,9 @@ NEARLY_CONTINUOUS = 1e-3
 
 MOST_FRAMES_LATE = 10
 """Up to this latency, in frames, the gain limit is found in a fraction of a second."""
+
+SMALLEST_GAIN = 1e-6
+"""Below this gain [1/s] no limit is looked for: a loop unstable there is so at any gain."""
 
 POINTS = 40
 """Number of gains to scan for a limit."""
@@ -153,6 +157,8 @@ def predicted_limit(
 ) -> GainLimit:
     """Return the gain limit of a loop up to some gain, of a continuous one too.
 
+    Looks below where `gain_limit` begins, too, if the loop is unstable there.
+
     Args:
         robot: the true robot, with its payload.
         goal: where the controller sees it, X_WP or [roll, pitch, yaw, x, y, z] (rad, m).
@@ -179,7 +185,20 @@ def predicted_limit(
     servo = SampledServo(
         robot, goal, period, believed=believed, cable_model=cable_model, tensions=tensions
     )
-    return find_gain_limit(servo, delay, highest=highest, points=POINTS)
+    limit = find_gain_limit(servo, delay, highest=highest, points=POINTS)
+    if limit.gain > 0.0:
+        return limit
+    lower = find_gain_limit(servo, delay, lowest=SMALLEST_GAIN, highest=LOWEST_GAIN, points=POINTS)
+    if lower.gain == 0.0 or not lower.unstable:
+        return limit
+    first = (lower.unstable[-1][0], limit.unstable[0][1])
+    return dataclasses.replace(
+        limit,
+        gain=lower.gain,
+        mode=lower.mode,
+        frequency=lower.frequency,
+        unstable=(*lower.unstable[:-1], first, *limit.unstable[1:]),
+    )
 
 
 def _rounded_down(value: float) -> float:
