@@ -154,6 +154,7 @@ def test_a_setup_without_a_gain_chooses_one(large: CableRobot) -> None:
     assert setup.gain == setup.chosen.gain == default_gain(large, goal).gain
     assert setup.replace(until=3.0).gain == setup.gain
     assert setup.replace(until=3.0).chosen is None  # the copy was told its gain
+    assert setup.replace(robot=large.replace(gain=0.01), gain=None).gain == 0.01
     given = Setup(robot=large, start=start, goal=goal, gain=0.1)
     assert given.chosen is None and "above the limit" in doubt_about_gain(given)
     with warnings.catch_warnings():
@@ -297,6 +298,8 @@ def test_a_slow_gain_has_the_time_it_needs(robot_file: Any) -> None:
         found.name, found.setups[0], found.chosen
     )
     assert plan(parse(["run", "--robot", "cogiro-22m", "--gain", "0.05"])).setups[0].until == 80.0
+    found = plan(parse(["run", "--robot", "cogiro-22m", "--until", "400"]))
+    assert "It ends" not in describe(found.name, found.setups[0], found.chosen)
 
 
 @pytest.mark.parametrize("command", ["linearize", "coupling", "sweep"])

@@ -13,7 +13,7 @@ import numpy as np
 from cdpr_drake.commands.gain import gain_in_words
 from cdpr_drake.commands.terminal import say
 from cdpr_drake.experiments import Prepared, Setup, paper_test
-from cdpr_drake.experiments.moves import LONGEST, move_near_the_middle, time_for
+from cdpr_drake.experiments.moves import DECAYS, LONGEST, move_near_the_middle, time_for
 from cdpr_drake.experiments.paper_tests import paper_tests
 from cdpr_drake.model.cable_models import CABLE_MODELS
 from cdpr_drake.model.robot import CableRobot, load_robot
@@ -161,9 +161,9 @@ def describe(name: str, setup: Setup, chosen: DefaultGain | None = None) -> str:
     if setup.calibrated is not None:
         noise = f"a calibrated robot believed, {noise}"
     gain, rest = gain_in_words(setup.gain, chosen), ""
-    if chosen is not None and setup.until == LONGEST:
-        decays = f"{setup.gain * setup.until:.2g} of the gain's time constants"
-        rest = f" It ends after {decays}; --until lets it go on."
+    decays = setup.gain * setup.until
+    if chosen is not None and setup.until == LONGEST and decays < DECAYS:
+        rest = f" It ends after {decays:.2g} of the gain's time constants; --until lets it go on."
     return (
         f"{what} on {setup.robot.name}, {setup.robot.mass:g} kg: {way:.2f} m and {turn:.1f} deg in "
         f"{setup.until:g} s, {gain}, {loop}, {noise}.{rest}"

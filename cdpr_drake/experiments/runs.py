@@ -58,7 +58,7 @@ class Setup:
         controller: "VBC", or "JSC" along the path that the ideal vision-based law would take.
         cable_model: the controller's "ECM", "CMWE", "SCMWE" or "SLSM"; the paper's JSC has "SCMWE".
         gain: lambda [1/s]; if None, `study.default_gain` at the goal. A number once made: a copy
-            by `replace` keeps it.
+            by `replace` keeps it, and with gain=None chooses anew.
         sample_time: period of the vision loop [s]; None for an all-continuous loop.
         latency: from image to change of the motor rates [s].
         ramp_time: over which the gain rises from zero at the start [s].
