@@ -42,6 +42,10 @@ class LinearizationError(CdprError, ValueError):
     """A diagram cannot be linearised; the message names the block in the way."""
 
 
+class PredictionError(CdprError, ValueError):
+    """The stability of a loop is not predicted; the message says why."""
+
+
 class CableError(CdprError, RuntimeError):
     """A cable leaves what the model covers.
 

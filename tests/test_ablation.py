@@ -51,7 +51,9 @@ def test_sensors_are_taken_away_one_kind_at_a_time(cogiro: CableRobot) -> None:
 @pytest.mark.parametrize("name", ["cogiro", "cogiro-98m"])
 def test_the_gain_keeps_away_from_its_limit(name: str) -> None:
     robot = load_robot(name)
-    gain = suitable_gain(robot)
+    found = suitable_gain(robot)
+    gain = found.gain
+    assert found.decided_by == ("custom" if gain == 0.3 else "limit")
     goal = ablation_setup(robot, sensor_sets(robot)[0], 0, gain).goal
     limit = gain_limit(robot, goal, robot.cameras.latency, robot.cameras.sample_time).gain
     assert gain <= 0.3 and gain < 0.65 * limit
@@ -178,6 +180,26 @@ def test_the_command_tells_it_and_writes_it_down(
     summary = json.loads((folder / "summary.json").read_text())
     row = summary["robots"]["cogiro"]["sensors"]["two pose cameras"]
     assert row["pose_cameras"] == 2 and row["position_error_mm"]["difference"] > 0.0
+
+
+def test_a_gain_that_limit_or_file_decide_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(ablation, "sweep", fake_sweep(lambda **case: dict.fromkeys(METRICS, 1.0)))
+    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.chdir(tmp_path)
+    large = load_robot("cogiro-98m")
+    cable = large.cable.replace(damping_time=0.1 * large.cable.damping_time)
+    for gain, by, reason in (
+        (None, "limit", "0.6 of the limit of "),
+        (0.01, "robot file", "as the robot file says"),
+    ):
+        Path("mine.yaml").write_text(large.replace(cable=cable, gain=gain).to_yaml())
+        argv = ["ablate", "--robot", "mine.yaml", "--seeds", "1", "--no-figures"]
+        assert main([*argv, "--output", "out"]) == 0
+        summary = json.loads(Path("out/summary.json").read_text())["robots"]["cogiro-98m"]
+        assert summary["gain_decided_by"] == by
+        assert f"lambda = {summary['gain_per_s']:g} 1/s ({reason}" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

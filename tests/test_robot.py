@@ -334,6 +334,22 @@ def test_a_file_may_use_anchors_and_leave_out_what_has_a_default(
     assert robot.load_cells == cogiro.load_cells
 
 
+@pytest.mark.parametrize("text", ["", "gain: null\n", "gain: 0.05\n", "gain: 5e-2\n"])
+def test_a_file_may_name_a_gain(text: str, cogiro: CableRobot, data: dict, tmp_path: Path) -> None:
+    path = tmp_path / "robot.yaml"
+    path.write_text(text + yaml.safe_dump(data))
+    robot = load_robot(path)
+    named = 0.05 if "5" in text else None
+    assert robot.gain == named and cogiro.gain is None
+    assert (robot == cogiro) is (named is None)
+    assert robot == cogiro.replace(gain=named) and hash(robot) == hash(cogiro.replace(gain=named))
+    assert pickle.loads(pickle.dumps(robot)) == robot and robot.replace(gain=None) == cogiro
+    save_robot(robot, path)
+    assert load_robot(path) == robot and ("\ngain:" in path.read_text()) is (named is not None)
+    with pytest.raises(RobotFileError, match=r"gain: must be positive and finite, got -1\.0"):
+        robot.replace(gain=-1.0)
+
+
 def test_a_rotation_may_be_written_as_a_matrix(
     cogiro: CableRobot, data: dict, tmp_path: Path
 ) -> None:
@@ -473,6 +489,13 @@ BAD = [
     (put("cameras.latency", -0.04), "cameras.latency", "must be >= 0"),
     (put("load_cells.order", 0), "load_cells.order", "must be positive"),
     (put("load_cells.noise", -1.0), "load_cells.noise", "must be >= 0"),
+    (put("gain", 0.0), "gain", "must be positive and finite, got 0.0"),
+    (put("gain", -0.1), "gain", "must be positive and finite"),
+    (put("gain", math.nan), "gain", "must be positive and finite"),
+    (put("gain", math.inf), "gain", "must be positive and finite"),
+    (put("gain", "fast"), "gain", "must be a number, got 'fast'"),
+    (put("gain", True), "gain", "must be a number"),
+    (put("gain", [0.1]), "gain", "must be a number"),
     (same_cable_twice, "drawing_points", "cables 2 and 5 are the same at both ends"),
     # bodies and rotations
     (row("platform.inertia", 0, [40.0, 9.0, 0.0]), "platform.inertia", "must be symmetric"),

@@ -81,7 +81,9 @@ def test_the_base_is_a_test_or_a_move_near_the_middle() -> None:
     assert base_case()["until"] == base_case(test=4)["until"]
     assert base_case(test=1)["payload"] == 110.0
     small = base_case("cogiro-22m")
-    assert "gain" not in small and small["start"] != base_case()["start"]
+    assert "until" not in small and small["start"] != base_case()["start"]
+    assert [base_case(test=n)["gain"] for n in (1, 4)] == [0.03, 0.1]
+    assert base_case(test=1, gain=0.2)["gain"] == 0.2
 
 
 def test_the_command_tells_the_spread(capsys: pytest.CaptureFixture[str], here: Path) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 from cdpr_drake.commands.answer import leave, wrapped
 from cdpr_drake.commands.arguments import UsageError
+from cdpr_drake.commands.gain import gain_in_words, gain_values
 from cdpr_drake.commands.kernels import compilation_announced
 from cdpr_drake.commands.place import as_file_name
 from cdpr_drake.commands.terminal import CaseProgress, Column, fitting, table, width_of
@@ -82,7 +83,8 @@ def _lines(found: Sequence[Ablation]) -> Iterator[str]:
     """Yield the lines of the answer."""
     for ablation in found:
         yield from wrapped(
-            f"{ablation.robot}: {ablation.distance:.2f} m at lambda = {ablation.gain:g} 1/s"
+            f"{ablation.robot}: {ablation.distance:.2f} m at "
+            f"{gain_in_words(ablation.gain, ablation.chosen)}"
         )
         yield table(fitting(_columns(ablation), width_of(sys.stdout)))
         for row in ablation.rows:
@@ -129,7 +131,7 @@ def _summary(options: argparse.Namespace, found: Sequence[Ablation]) -> dict[str
         "unknown_payload_kg": options.unknown_payload,
         "robots": {
             ablation.robot: {
-                "gain_per_s": ablation.gain,
+                **gain_values(ablation.gain, ablation.chosen),
                 "distance_m": ablation.distance,
                 "sensors": {row.sensors.label: _values(row) for row in ablation.rows},
             }

@@ -36,7 +36,8 @@ def add_ablate(commands: Any) -> None:
     )  # fmt: skip
     what.add_argument(
         "--gain", type=float, metavar="PER_S",
-        help="lambda [1/s] (default: 0.3, or 0.6 of the limit at the goal if that is less)",
+        help="lambda [1/s] (default: the robot file's; else 0.3, or 0.6 of the limit at the goal "
+        "if that is less)",
     )  # fmt: skip
     what.add_argument(
         "--unknown-payload", type=float, default=0.0, metavar="KG",

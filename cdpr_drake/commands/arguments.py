@@ -6,7 +6,7 @@ import argparse
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from cdpr_drake import __version__
 
@@ -144,7 +144,17 @@ def _add_run(commands: argparse._SubParsersAction[_Parser]) -> None:
             help=f"the platform's {text}: position [m]; roll, pitch, yaw [deg], level if left out",
         )  # fmt: skip
 
-    how = run.add_argument_group("how it is controlled")
+    _add_control(run.add_argument_group("how it is controlled"))
+    out = run.add_argument_group("what comes out")
+    out.add_argument(
+        "--output", type=Path, metavar="DIR", help="(default: a directory in ./out, which it names)"
+    )
+    out.add_argument("--json", action="store_true", help="print the summary as JSON, nothing else")
+    out.add_argument("--no-figures", action="store_true", help="write no figures")
+    out.add_argument("--no-replay", action="store_true", help="write no replay")
+
+
+def _add_control(how: Any) -> None:
     how.add_argument(
         "--controller", choices=("vbc", "jsc", "both"), default="both", help="(default: both)"
     )
@@ -152,7 +162,11 @@ def _add_run(commands: argparse._SubParsersAction[_Parser]) -> None:
         "--cable-model", type=parse_models, action="extend", metavar="MODEL,...",
         help="of VBC: ECM, CMWE, SCMWE, SLSM; one run each (default: SCMWE,SLSM)",
     )  # fmt: skip
-    how.add_argument("--gain", type=float, metavar="PER_S", help="lambda [1/s]")
+    how.add_argument(
+        "--gain", type=float, metavar="PER_S",
+        help="lambda [1/s] (default: that of --test; else the robot file's; else 0.1, or half the "
+        "limit at the goal if that is less)",
+    )  # fmt: skip
     how.add_argument(
         "--sample-time", type=float, metavar="S",
         help="of the vision loop (default: the robot's); 0: all continuous, no latency",
@@ -177,12 +191,8 @@ def _add_run(commands: argparse._SubParsersAction[_Parser]) -> None:
     )  # fmt: skip
     how.add_argument("--no-noise", action="store_true", help="perfect cameras and load cells")
     how.add_argument("--seed", type=int, default=0, metavar="N", help="of the noise (default: 0)")
-    how.add_argument("--until", type=float, metavar="S", help="time to run")
-
-    out = run.add_argument_group("what comes out")
-    out.add_argument(
-        "--output", type=Path, metavar="DIR", help="(default: a directory in ./out, which it names)"
-    )
-    out.add_argument("--json", action="store_true", help="print the summary as JSON, nothing else")
-    out.add_argument("--no-figures", action="store_true", help="write no figures")
-    out.add_argument("--no-replay", action="store_true", help="write no replay")
+    how.add_argument(
+        "--until", type=float, metavar="S",
+        help="time to run (default: the test's, or 80; eight time constants of a gain that robot "
+        "file or limit decide, at most 400)",
+    )  # fmt: skip

@@ -10,13 +10,22 @@ import numpy as np
 
 from cdpr_drake.commands.answer import counted, leave, wrapped
 from cdpr_drake.commands.arguments import UsageError
+from cdpr_drake.commands.gain import gain_in_words, gain_values
 from cdpr_drake.commands.kernels import compilation_announced
 from cdpr_drake.commands.place import as_file_name, place, pose_values, with_payload
 from cdpr_drake.commands.terminal import Column, fitting, table, width_of
 from cdpr_drake.errors import CdprError
 from cdpr_drake.model.cable_models import CABLE_MODELS
 from cdpr_drake.model.robot import load_robot
-from cdpr_drake.study import Comparison, ModelComparison, comparable_pose, compare_cable_models
+from cdpr_drake.study import (
+    Comparison,
+    DefaultGain,
+    ModelComparison,
+    comparable_pose,
+    compare_cable_models,
+    default_gain,
+    lowest_gain,
+)
 from cdpr_drake.study.compare import ROBOTS
 
 
@@ -29,22 +38,28 @@ def coupling_command(options: argparse.Namespace) -> int:
     Raises:
         UsageError: the input cannot be used; nothing was written.
     """
-    if not (np.isfinite(options.gain) and options.gain > 0.0):
+    if options.gain is not None and not (np.isfinite(options.gain) and options.gain > 0.0):
         raise UsageError(f"--gain: must be positive and finite, got {options.gain:g}/s")
     try:
         with compilation_announced():
             comparison = _compare(options)
+            chosen = _lowest_gain(comparison) if options.gain is None else None
     except (CdprError, ValueError) as error:
         raise UsageError(str(error)) from error
-    summary = {"gain_per_s": options.gain, "rows": [_row(row) for row in comparison.rows]}
+    gain = options.gain if chosen is None else chosen.gain
+    rows = [_row(row) for row in comparison.rows]
+    summary = {**gain_values(gain, chosen), "rows": rows}
     columns = fitting(_columns(comparison), width_of(sys.stdout))
     meaning = " ".join(column.meaning for column in columns if column.meaning)
     lines = [table(columns), "", *wrapped(meaning)]
+    if chosen is not None and chosen.reason():
+        text = gain_in_words(gain, chosen, "at one of these poses")
+        lines += wrapped(f"In the figure {text}.")
 
     def figures() -> dict[str, Any]:
         from cdpr_drake.show import rates_and_responses_figure
 
-        return {"rates_and_responses": rates_and_responses_figure(comparison, options.gain)}
+        return {"rates_and_responses": rates_and_responses_figure(comparison, gain)}
 
     names = "-".join(dict.fromkeys(row.robot for row in comparison.rows))
     name = as_file_name(names) if options.robot else "sizes"
@@ -66,6 +81,17 @@ def _compare(options: argparse.Namespace) -> Comparison:
             robot, pose, _ = place(asked)
         rows += compare_cable_models([robot], models, poses={robot.name: pose}).rows
     return Comparison(rows=tuple(rows))
+
+
+def _lowest_gain(comparison: Comparison) -> DefaultGain:
+    """Return the gain that is good for all rows: they are drawn at one."""
+
+    def found(row: ModelComparison) -> DefaultGain:
+        robot = row.gamma.rest.robot
+        timing = robot.cameras.sample_time, robot.cameras.latency
+        return default_gain(robot, row.gamma.pose, row.cable_model, *timing)
+
+    return lowest_gain(found(row) for row in comparison.rows)
 
 
 def _row(row: ModelComparison) -> dict[str, Any]:

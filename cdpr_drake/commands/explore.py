@@ -6,11 +6,13 @@ import argparse
 import math
 
 from cdpr_drake.commands.arguments import UsageError
+from cdpr_drake.commands.gain import gain_in_words
 from cdpr_drake.commands.kernels import compilation_announced
 from cdpr_drake.commands.place import in_words, place
 from cdpr_drake.commands.terminal import print_wrapped
 from cdpr_drake.errors import CdprError
 from cdpr_drake.show.explorer import Explorer
+from cdpr_drake.study import default_gain
 
 PORTS = (1024, 65534)
 """From the first to the last that may be asked for: the next one has to be there too."""
@@ -33,13 +35,19 @@ def explore_command(options: argparse.Namespace) -> int:
     try:
         robot, pose, where = place(options)
         with compilation_announced():
-            explorer = Explorer(robot, pose, options.cable_model, options.gain, options.port)
+            gain, chosen = options.gain, None
+            if gain is None:
+                timing = robot.cameras.sample_time, robot.cameras.latency
+                chosen = default_gain(robot, pose, options.cable_model, *timing)
+                gain = chosen.gain
+            explorer = Explorer(robot, pose, options.cable_model, gain, options.port)
     except (CdprError, ValueError) as error:
         raise UsageError(str(error)) from error
     except (OSError, RuntimeError) as error:
         raise UsageError(f"--port {options.port}: {error}") from error
     try:
-        print_wrapped(f"{in_words(robot, pose, where)}.")
+        why = gain_in_words(gain, chosen, "there") if chosen and chosen.reason() else ""
+        print_wrapped(f"{in_words(robot, pose, where)}{f'; {why}' if why else ''}.")
         print(
             f"Open {explorer.address} in a browser; Stop there or Ctrl-C here ends it.", flush=True
         )

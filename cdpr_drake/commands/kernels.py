@@ -30,10 +30,11 @@ def compilation_announced() -> Iterator[None]:
         say("note: numba is not installed or off; runs take several times longer without it")
         return
     finished = threading.Event()
+    earlier = _compiled()
 
     def watch() -> None:
         while not finished.wait(0.1):
-            if any(sum(kernel.stats.cache_misses.values()) for kernel in _kernels()):
+            if _compiled() > earlier:
                 say("compiling kernels on their first use; this takes up to a minute ...")
                 return
 
@@ -53,8 +54,13 @@ def compile_ahead() -> None:
     from cdpr_drake.experiments import prepare
 
     with compilation_announced():
-        for setup in plan(parse(["run"]))[1]:
+        for setup in plan(parse(["run"])).setups:
             prepare(setup)
+
+
+def _compiled() -> int:
+    """Return how many kernels this process has compiled so far, rather than loaded."""
+    return sum(sum(kernel.stats.cache_misses.values()) for kernel in _kernels())
 
 
 def _kernels() -> Iterator[Any]:

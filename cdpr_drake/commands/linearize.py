@@ -7,11 +7,20 @@ from typing import Any
 
 from cdpr_drake.commands.answer import leave, note, wrapped
 from cdpr_drake.commands.arguments import UsageError
+from cdpr_drake.commands.gain import gain_in_words, gain_values
 from cdpr_drake.commands.kernels import compilation_announced
 from cdpr_drake.commands.place import as_file_name, in_words, place, pose_values
 from cdpr_drake.diagrams import make_vision_based_control
 from cdpr_drake.errors import CdprError
-from cdpr_drake.study import Mode, Modes, equilibrium, linearize, modes, one_period_map
+from cdpr_drake.study import (
+    Mode,
+    Modes,
+    default_gain,
+    equilibrium,
+    linearize,
+    modes,
+    one_period_map,
+)
 from cdpr_drake.study.modes import named
 
 
@@ -33,11 +42,16 @@ def linearize_command(options: argparse.Namespace) -> int:
         latency = cameras.latency if options.latency is None else options.latency
         with compilation_announced():
             note("linearising the loop")
+            sampling = None if options.continuous else period
+            gain, chosen = options.gain, None
+            if gain is None:
+                chosen = default_gain(robot, pose, options.cable_model, sampling, latency)
+                gain = chosen.gain
             loop = make_vision_based_control(
                 robot,
                 options.cable_model,
-                gain=options.gain,
-                sample_time=None if options.continuous else period,
+                gain=gain,
+                sample_time=sampling,
                 latency=0.0 if options.continuous else latency,
             )
             at_rest = equilibrium(loop, pose)
@@ -49,14 +63,14 @@ def linearize_command(options: argparse.Namespace) -> int:
         raise UsageError(str(error)) from error
     timing = "continuous" if options.continuous else f"{period:g} s, {1e3 * latency:g} ms late"
     head = f"{in_words(robot, pose, where)}; {options.cable_model}, "
-    head += f"lambda = {options.gain:g} 1/s, {timing}."
+    head += f"{gain_in_words(gain, chosen, 'there')}, {timing}."
     summary: dict[str, Any] = {
         "robot": robot.name,
         "mass_kg": robot.mass,
         "pose_x_y_z_m_roll_pitch_yaw_deg": pose_values(pose),
         "cable_model": options.cable_model,
-        "gain_per_s": options.gain,
-        "sample_time_s": None if options.continuous else period,
+        **gain_values(gain, chosen),
+        "sample_time_s": sampling,
         "latency_s": None if options.continuous else latency,
         "is_stable": not found.unstable,
         "neutral": _neutral(found),

@@ -11,6 +11,7 @@ from typing import Any
 
 from cdpr_drake.commands.arguments import UsageError
 from cdpr_drake.commands.files import SUMMARY, staged, to_json, write_log, write_summary
+from cdpr_drake.commands.gain import gain_values
 from cdpr_drake.commands.kernels import compilation_announced
 from cdpr_drake.commands.plan import describe, plan, warn_of_low_tensions
 from cdpr_drake.commands.results import print_results, summarize
@@ -29,15 +30,15 @@ def run_command(options: argparse.Namespace) -> int:
         UsageError: the input cannot be used; nothing was run or written.
     """
     try:
-        name, setups = plan(options)
         with compilation_announced():
+            name, setups, chosen = plan(options)
             ready = [prepare(setup) for setup in setups]
     except (CdprError, ValueError) as error:
         raise UsageError(str(error)) from error
     warn_of_low_tensions(ready)
     directory = options.output or Path("out") / name
     if not options.json:
-        print_wrapped(describe(name, setups[0]))
+        print_wrapped(describe(name, setups[0], chosen))
     try:
         with contextlib.ExitStack() as stack:
             try:
@@ -46,6 +47,8 @@ def run_command(options: argparse.Namespace) -> int:
                 raise UsageError(f"--output {directory}: {error.strerror or error}") from error
             runs = carry_out(ready)
             summary = summarize(name, setups[0], runs)
+            asked = "option" if options.gain is not None else "test"
+            summary |= gain_values(setups[0].gain, chosen, asked)
             write_all(folder, summary, runs, options)
     except CdprError as error:
         say(f"error: {error}; nothing written")

@@ -31,8 +31,7 @@ def add_study_commands(commands: Any) -> None:
     how = linearize.add_argument_group("how it is controlled")
     how.add_argument("--cable-model", default="SCMWE", metavar="MODEL", type=str.upper,
                      help="of the law: ECM, CMWE, SCMWE, SLSM (default: SCMWE)")  # fmt: skip
-    how.add_argument("--gain", type=float, default=0.1, metavar="PER_S",
-                     help="lambda [1/s] (default: 0.1)")  # fmt: skip
+    _add_gain(how, "lambda [1/s]")
     how.add_argument("--continuous", action="store_true",
                      help="neither sampled nor late")  # fmt: skip
     _add_timing(how)
@@ -76,8 +75,7 @@ def add_study_commands(commands: Any) -> None:
     how = coupling.add_argument_group("how it is controlled")
     how.add_argument("--cable-model", type=parse_models, action="extend", metavar="MODEL,...",
                      help="of the law (default: ECM,CMWE,SCMWE,SLSM)")  # fmt: skip
-    how.add_argument("--gain", type=float, default=0.1, metavar="PER_S",
-                     help="lambda of the figure [1/s] (default: 0.1)")  # fmt: skip
+    _add_gain(how, "lambda of the figure [1/s]", "; the lowest of robots and models")
     _add_output(coupling)
     _add_explore(commands)
 
@@ -97,8 +95,7 @@ def _add_explore(commands: Any) -> None:
     how = explore.add_argument_group("how it is controlled")
     how.add_argument("--cable-model", default="SCMWE", metavar="MODEL", type=str.upper,
                      help="of the law: ECM, CMWE, SCMWE, SLSM (default: SCMWE)")  # fmt: skip
-    how.add_argument("--gain", type=float, default=0.1, metavar="PER_S",
-                     help="lambda to begin with [1/s] (default: 0.1)")  # fmt: skip
+    _add_gain(how, "lambda to begin with [1/s]")
     page = explore.add_argument_group("the page")
     page.add_argument("--port", type=int, default=0, metavar="N",
                       help="of the page, 1024 to 65534; Meshcat takes the next one "
@@ -140,6 +137,14 @@ def _add_place(parser: Any, option: str, several: bool = False) -> None:
     what.add_argument(
         "--pose", type=parse_pose, metavar="X,Y,Z[,R,P,Y]",
         help=f"position [m]; roll, pitch, yaw [deg] (default: {default})",
+    )  # fmt: skip
+
+
+def _add_gain(group: Any, what: str, more: str = "") -> None:
+    group.add_argument(
+        "--gain", type=float, metavar="PER_S",
+        help=f"{what} (default: the robot file's; else 0.1, or half the limit at the pose if that "
+        f"is less{more})",
     )  # fmt: skip
 
 

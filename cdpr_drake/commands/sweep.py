@@ -15,12 +15,15 @@ import numpy as np
 from cdpr_drake import __version__
 from cdpr_drake.commands.answer import leave, wrapped
 from cdpr_drake.commands.arguments import UsageError
+from cdpr_drake.commands.gain import gain_in_words
 from cdpr_drake.commands.kernels import compilation_announced
 from cdpr_drake.commands.place import as_file_name
 from cdpr_drake.commands.terminal import CaseProgress, Column, fitting, say, table, width_of
 from cdpr_drake.errors import CdprError, SweepError
 from cdpr_drake.experiments import prepare
-from cdpr_drake.experiments.monte_carlo import METRICS, base_case, draw, run_case
+from cdpr_drake.experiments.monte_carlo import METRICS, base_case, chosen_gain, draw, run_case
+from cdpr_drake.experiments.moves import time_for
+from cdpr_drake.study.default_gain import DefaultGain
 from cdpr_drake.study.sweep import Sweep, case_seed, sweep
 
 CASES = "cases"
@@ -48,8 +51,8 @@ def sweep_command(options: argparse.Namespace) -> int:
         UsageError: the input cannot be used; nothing was run.
     """
     try:
-        base, spread = _plan(options)
         with compilation_announced():
+            base, spread, chosen = _plan(options)
             setup, _ = draw(base, case_seed(options.seed, 0), **spread)
             prepare(setup)
     except (CdprError, ValueError) as error:
@@ -88,12 +91,17 @@ def sweep_command(options: argparse.Namespace) -> int:
 
         return {"sweep": sweep_figure(found)} if len(found.errors) < len(found) else {}
 
-    leave(options, name, _summary(options, base, spread, found), list(_lines(found)), figures)
+    summary = _summary(options, base, spread, found)
+    if chosen is not None:
+        summary |= chosen.to_dict()
+    leave(options, name, summary, list(_lines(found, chosen)), figures)
     return 1 if found.errors else 0
 
 
-def _plan(options: argparse.Namespace) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return what all cases have in common, and what is drawn for each."""
+def _plan(
+    options: argparse.Namespace,
+) -> tuple[dict[str, Any], dict[str, Any], DefaultGain | None]:
+    """Return what all cases have in common, what is drawn for each, and why their gain is so."""
     for name, value in (("--cases", options.cases), ("--jobs", options.jobs)):
         if value is not None and value < 1:
             raise ValueError(f"{name}: must be at least 1, got {value}")
@@ -119,7 +127,14 @@ def _plan(options: argparse.Namespace) -> tuple[dict[str, Any], dict[str, Any]]:
             spread[f"{name}s"] = list(given)
     if options.until is not None:
         changes["until"] = options.until
-    return base_case(options.robot, options.test, **changes), spread
+    base = base_case(options.robot, options.test, **changes)
+    if options.gain is not None or options.test is not None:
+        return base, spread, None
+    chosen = chosen_gain(base, spread.get("payloads"))
+    base["gain"] = chosen.gain
+    if chosen.decided_by != "custom" and options.until is None:
+        base["until"] = time_for(chosen.gain)
+    return base, spread, chosen
 
 
 @contextlib.contextmanager
@@ -148,8 +163,10 @@ def _columns(found: Sweep) -> dict[str, np.ndarray]:
     return {name: column[np.isfinite(column)] for name, column in columns.items()}
 
 
-def _lines(found: Sweep) -> Iterator[str]:
+def _lines(found: Sweep, chosen: DefaultGain | None) -> Iterator[str]:
     """Yield the lines of the answer."""
+    if chosen is not None and chosen.reason():
+        yield from wrapped(f"At {gain_in_words(chosen.gain, chosen)}.")
     if len(found.errors) < len(found):
         yield table(fitting(_table(_columns(found)), width_of(sys.stdout)))
         late = int(np.isnan(found.column("settled_after")).sum()) - len(found.errors)

@@ -53,7 +53,8 @@ def add_sweep(commands: Any) -> None:
     drawn.add_argument("--payload", type=_range, metavar="KG[,KG]",
                        help="mass carried, or from and to (default: the test's)")  # fmt: skip
     drawn.add_argument("--gain", type=_range, metavar="PER_S[,PER_S]",
-                       help="lambda, or from and to [1/s] (default: the test's)")  # fmt: skip
+                       help="lambda, or from and to [1/s] (default: that of --test; else the "
+                       "robot file's; else 0.1, or half the limit there if less)")  # fmt: skip
 
     where = parser.add_argument_group("where it runs")
     where.add_argument("--jobs", type=int, metavar="N",

@@ -13,7 +13,7 @@ from cdpr_drake.diagrams.eyes import add_pose_cameras, add_tangent_cameras, chec
 from cdpr_drake.diagrams.robot import ROBOT_OUTPUTS, make_cable_robot
 from cdpr_drake.model.modelled import MODELLED
 from cdpr_drake.model.robot import CableRobot
-from cdpr_drake.model.servo import ServoSettings
+from cdpr_drake.model.servo import CUSTOMARY_GAIN, ServoSettings
 from cdpr_drake.model.vision.outages import LOAD_CELL, Outage
 from cdpr_drake.systems import (
     FusedPlant,
@@ -34,7 +34,7 @@ NOISE_PERIOD = 0.05
 def make_vision_based_control(
     robot: CableRobot,
     cable_model: str = "SCMWE",
-    gain: float = 0.1,
+    gain: float | None = None,
     sample_time: float | None = 0.05,
     latency: float = 0.04,
     *,
@@ -81,7 +81,8 @@ def make_vision_based_control(
     Args:
         robot: the true robot.
         cable_model: the control law's "ECM", "CMWE", "SCMWE" or "SLSM".
-        gain: lambda [1/s].
+        gain: lambda [1/s]; if None, the robot's own where its file names one, else 0.1. Whether
+            that is below the limit at a goal, `study.default_gain` knows.
         sample_time: period T of the vision loop [s]; None for an all-continuous loop.
         latency: from image to change of the motor rates [s]; without effect if all is continuous.
         calibrated: the robot as the controller believes it; the true one if None.
@@ -116,6 +117,8 @@ def make_vision_based_control(
         raise ValueError(
             f"{believed.num_cables} cables in the calibrated robot, {k} in the true one"
         )
+    if gain is None:
+        gain = CUSTOMARY_GAIN if robot.gain is None else robot.gain
     fields = {**(vars(settings) if settings else {}), **servo}
     law = ServoSettings(**{**fields, "cable_model": cable_model, "gain": gain})
     check_sampling(gain, sample_time, latency)

@@ -19,7 +19,7 @@ from cdpr_drake.experiments.moves import move_near_the_middle
 from cdpr_drake.experiments.paper_tests import paper_test, paper_tests
 from cdpr_drake.experiments.runs import Setup, prepare, run
 from cdpr_drake.model.robot import CableRobot, load_robot
-from cdpr_drake.study import Outcome, gain_limit, sweep
+from cdpr_drake.study import DefaultGain, Outcome, default_gain, sweep
 
 TEST = 4
 """The paper's test that its own robot makes; others make a short move near their middle."""
@@ -109,12 +109,14 @@ class Ablation:
     Attributes:
         robot: its name.
         gain: lambda of all runs [1/s].
+        chosen: why it is this one, if nobody asked for one; else None.
         distance: of the move [m].
         rows: one for each set of sensors, all of them first.
     """
 
     robot: str
     gain: float
+    chosen: DefaultGain | None = None
     distance: float
     rows: tuple[Worth, ...]
 
@@ -175,18 +177,19 @@ def ablation_setup(
     )
 
 
-def suitable_gain(robot: CableRobot, payload: float = 0.0) -> float:
-    """Return lambda [1/s] for a robot's run: `HIGHEST_GAIN`, less where that comes near the limit.
+def suitable_gain(robot: CableRobot, payload: float = 0.0) -> DefaultGain:
+    """Return lambda for a robot's run: its file's, or `HIGHEST_GAIN`, less where the limit is near.
 
     Args:
         robot: the robot.
         payload: carried [kg].
     """
     _, goal = _move(robot)
-    timing = (robot.cameras.latency, robot.cameras.sample_time)
+    timing = (robot.cameras.sample_time, robot.cameras.latency)
     loaded = robot.with_payload(payload) if payload else robot
-    limit = gain_limit(loaded, goal, *timing, highest=2.0 * HIGHEST_GAIN, points=40)
-    return float(f"{min(HIGHEST_GAIN, SHARE_OF_LIMIT * limit.gain):.2g}")
+    return default_gain(
+        loaded, goal, "SCMWE", *timing, customary=HIGHEST_GAIN, share=SHARE_OF_LIMIT
+    )
 
 
 def ablate(
@@ -223,19 +226,23 @@ def ablate(
             "unknown_payload": unknown_payload,
             "seed": seed,
         }
-        for name, (setup, sets) in zip(robots, plans, strict=True)
+        for name, (setup, sets, _) in zip(robots, plans, strict=True)
         for sensors in sets
         for seed in range(seeds)
     ]
     results = sweep(ablation_case, cases, seed=None, jobs=jobs, batch=1, progress=progress)
     outcomes = iter(results.outcomes)
     found = []
-    for setup, sets in plans:
+    for setup, sets, chosen in plans:
         own = [[next(outcomes) for _ in range(seeds)] for _ in sets]
         rows = [_worth(s, o, own[0]) for s, o in zip(sets, own, strict=True)]
         distance = float(np.linalg.norm(setup.goal.translation() - setup.start.translation()))
         ablation = Ablation(
-            robot=setup.robot.name, gain=setup.gain, distance=distance, rows=tuple(rows)
+            robot=setup.robot.name,
+            gain=setup.gain,
+            chosen=chosen,
+            distance=distance,
+            rows=tuple(rows),
         )
         found.append(ablation)
     return found
@@ -268,14 +275,16 @@ def _move(robot: CableRobot) -> Any:
 
 def _plan(
     name: str, gain: float | None, unknown_payload: float
-) -> tuple[Setup, tuple[SensorSet, ...]]:
-    """Return the first run of a robot, which is known to work, and all sets of sensors."""
+) -> tuple[Setup, tuple[SensorSet, ...], DefaultGain | None]:
+    """Return the first run of a robot, which works, all sets of sensors, and why that gain."""
     robot = load_robot(name)
     sets = sensor_sets(robot)
-    pace = gain if gain is not None else suitable_gain(robot, unknown_payload)
+    chosen = suitable_gain(robot, unknown_payload) if gain is None else None
+    pace = gain if chosen is None else chosen.gain
+    assert pace is not None
     setup = ablation_setup(robot, sets[0], 0, pace, unknown_payload)
     prepare(setup)
-    return setup, sets
+    return setup, sets, chosen
 
 
 def _worth(sensors: SensorSet, outcomes: Sequence[Outcome], reference: Sequence[Outcome]) -> Worth:

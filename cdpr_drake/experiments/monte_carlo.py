@@ -14,6 +14,7 @@ from cdpr_drake.experiments.runs import Setup, run
 from cdpr_drake.model.calibration_errors import CalibrationErrors, misjudged
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.rotations import pose_to_vector
+from cdpr_drake.study.default_gain import DefaultGain, lowest_gain
 from cdpr_drake.study.step_size import StepWarning
 
 METRICS = (
@@ -33,6 +34,8 @@ def base_case(
 ) -> dict[str, Any]:
     """Return what all cases of a sweep have in common, as plain values.
 
+    The gain is that of the changes, or of a test asked for; else that of `chosen_gain`.
+
     Args:
         robot_name: a built-in robot's, or a robot file; CoGiRo if None.
         test: one of the paper's; if None, Test 4 on CoGiRo, a short move near the middle of others.
@@ -45,6 +48,8 @@ def base_case(
     """
     name = robot_name if robot_name is not None else paper_tests().robot
     robot = load_robot(name)
+    if test is not None and "gain" not in changes:
+        changes["gain"] = paper_test(test).gain
     if test is None and robot.name == paper_tests().robot:
         test = 4
     case: dict[str, Any] = {
@@ -58,9 +63,29 @@ def base_case(
         found = paper_test(test)
         robot = found.carried_by(robot)
         start, goal = found.poses(robot)
-        case |= {"payload": robot.payload.mass, "gain": found.gain, "until": found.duration}
+        case |= {"payload": robot.payload.mass, "until": found.duration}
     case |= {"start": pose_to_vector(start).tolist(), "goal": pose_to_vector(goal).tolist()}
-    return case | changes
+    case |= changes
+    return case if "gain" in case else {**case, "gain": chosen_gain(case).gain}
+
+
+def chosen_gain(
+    base: Mapping[str, Any], payloads: tuple[float, float] | None = None
+) -> DefaultGain:
+    """Return the gain for the cases of a base if nobody asks for one; the lower of two payloads.
+
+    Args:
+        base: from `base_case`; its gain is not heeded.
+        payloads: from which the mass carried is drawn [kg]; that of the base if None.
+
+    Raises:
+        RobotFileError: the robot cannot be read, or cannot carry the payload.
+        ValueError: a value is out of range.
+    """
+    case = {name: value for name, value in base.items() if name != "gain"}
+    masses = payloads if payloads is not None else (base["payload"],)
+    found = [draw({**case, "payload": mass}, 0, calibration=0.0)[0].chosen for mass in masses]
+    return lowest_gain(one for one in found if one is not None)
 
 
 def draw(

@@ -9,6 +9,18 @@ from cdpr_drake.model.robot import CableRobot
 
 START_HEIGHT, RISE, SHIFT = 0.3, 0.1, 0.05
 
+DECAYS, LONGEST = 8.0, 400.0
+"""How long a move takes by default: time constants of its gain, but at most so long [s]."""
+
+
+def time_for(gain: float) -> float:
+    """Return the time [s] for a move at a gain that robot file or limit decide, with three digits.
+
+    Args:
+        gain: lambda [1/s].
+    """
+    return float(f"{min(DECAYS / gain, LONGEST):.3g}")
+
 
 def move_near_the_middle(robot: CableRobot) -> tuple[RigidTransform, RigidTransform]:
     """Return X_WP at the start and the goal of a short level move near the middle of a robot.

@@ -31,11 +31,12 @@ from cdpr_drake.experiments.reach import check_inverse_kinematics, check_pose
 from cdpr_drake.model.cable_models import CABLE_MODELS
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.rotations import Array, as_pose, pose_to_vector
-from cdpr_drake.model.servo import PoseErrorMap
+from cdpr_drake.model.servo import CUSTOMARY_GAIN, PoseErrorMap
 from cdpr_drake.model.vision.outages import LOAD_CELL, Outage
 from cdpr_drake.model.vision.pose import ESTIMATORS
+from cdpr_drake.study.default_gain import DefaultGain, default_gain, predicted_limit
 from cdpr_drake.study.modes import platform_modes
-from cdpr_drake.study.stability import SampledServo, StabilityWarning, find_gain_limit
+from cdpr_drake.study.stability import StabilityWarning
 from cdpr_drake.study.step_size import StepWarning, step_error, step_limit
 from cdpr_drake.systems import ExponentialApproach
 
@@ -44,12 +45,6 @@ CONTROLLERS = ("VBC", "JSC")
 
 RECORD_PERIOD = 0.05
 """Time between two lines of a run's record [s]."""
-
-NEARLY_CONTINUOUS = 1e-3
-"""A loop sampled so often [s] has the gain limit of the continuous one to within a per cent."""
-
-MOST_FRAMES_LATE = 10
-"""Up to this latency, in frames, the gain limit is found in a fraction of a second."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -62,7 +57,8 @@ class Setup:
         goal: X_WP at the goal, in either form.
         controller: "VBC", or "JSC" along the path that the ideal vision-based law would take.
         cable_model: the controller's "ECM", "CMWE", "SCMWE" or "SLSM"; the paper's JSC has "SCMWE".
-        gain: lambda [1/s].
+        gain: lambda [1/s]; if None, `study.default_gain` at the goal. A number once made: a copy
+            by `replace` keeps it, and with gain=None chooses anew.
         sample_time: period of the vision loop [s]; None for an all-continuous loop.
         latency: from image to change of the motor rates [s].
         ramp_time: over which the gain rises from zero at the start [s].
@@ -77,6 +73,9 @@ class Setup:
         modelled: "tensions" and "tangents" that VBC takes from the model instead of from sensors.
         tensions: those of VBC at the start, "minimum norm" or "within limits" of the robot.
 
+    Attributes:
+        chosen: why the gain is what it is, if it was None; else None.
+
     Raises:
         ValueError: a value is out of range.
     """
@@ -86,7 +85,7 @@ class Setup:
     goal: RigidTransform
     controller: str = "VBC"
     cable_model: str = "SCMWE"
-    gain: float = 0.1
+    gain: float = None  # type: ignore[assignment]
     sample_time: float | None = 0.05
     latency: float = 0.04
     ramp_time: float = 1.0
@@ -100,6 +99,7 @@ class Setup:
     outages: tuple[Outage, ...] = ()
     modelled: tuple[str, ...] = ()
     tensions: str = "minimum norm"
+    chosen: DefaultGain | None = dataclasses.field(default=None, init=False)
 
     def __post_init__(self) -> None:
         for name in ("start", "goal"):
@@ -112,8 +112,9 @@ class Setup:
         ):
             if choice not in known:
                 raise ValueError(f'unknown {name} "{choice}"; known are {", ".join(known)}')
+        gain: Any = self.gain
         for name, value in (
-            ("the gain", self.gain),
+            ("the gain", CUSTOMARY_GAIN if gain is None else gain),
             ("the time to run until", self.until),
             ("the integrator's step", self.max_step),
         ):
@@ -130,6 +131,10 @@ class Setup:
             )
         if not 0 <= self.seed < 2**32:
             raise ValueError(f"the seed must be from 0 to 2^32 - 1, got {self.seed}")
+        if gain is None:
+            chosen = _default_gain(self)
+            object.__setattr__(self, "chosen", chosen)
+            object.__setattr__(self, "gain", chosen.gain)
 
     @property
     def label(self) -> str:
@@ -271,30 +276,36 @@ def doubt_about_gain(setup: Setup) -> str:
     """
     if setup.controller != "VBC":
         return ""
-    period, latency = setup.sample_time, setup.latency
-    if period is None:
-        period, latency = NEARLY_CONTINUOUS, 0.0
-    unknown = f"{setup.label}: whether the gain is stable at the goal is not predicted: "
-    if latency > MOST_FRAMES_LATE * period:
-        return f"{unknown}the latency is above {MOST_FRAMES_LATE} frames"
-    try:
-        servo = SampledServo(
-            setup.robot,
-            setup.goal,
-            period,
-            believed=setup.calibrated,
-            cable_model=setup.cable_model,
-            tensions=setup.tensions,
-        )
-    except CdprError as error:
-        return f"{unknown}{error}"
-    limit = find_gain_limit(servo, latency, highest=max(setup.gain, 0.01), points=40)
+    limit = setup.chosen.limit if setup.chosen is not None else None
+    if limit is None:
+        try:
+            limit = predicted_limit(*_loop(setup), **_law(setup), highest=max(setup.gain, 0.01))
+        except CdprError as error:
+            text = f"{setup.label}: whether the gain is stable at the goal is not predicted"
+            return f"{text}: {error}"
     if setup.gain <= limit.gain:
         return ""
     return (
         f"{setup.label}: the gain of {setup.gain:g}/s is above the limit predicted at the goal, "
         f"{limit.gain:.3g}/s, where {limit.mode} goes unstable at {limit.frequency:.3g} Hz"
     )
+
+
+def _default_gain(setup: Setup) -> DefaultGain:
+    """Return the gain of a setup without one; joint space control closes no loop around it."""
+    if setup.controller != "VBC":
+        own = setup.robot.gain
+        by = "custom" if own is None else "robot file"
+        return DefaultGain(gain=CUSTOMARY_GAIN if own is None else own, decided_by=by)
+    return default_gain(*_loop(setup), **_law(setup))
+
+
+def _loop(setup: Setup) -> tuple[CableRobot, RigidTransform, str, float | None, float]:
+    return setup.robot, setup.goal, setup.cable_model, setup.sample_time, setup.latency
+
+
+def _law(setup: Setup) -> dict[str, Any]:
+    return {"believed": setup.calibrated, "tensions": setup.tensions}
 
 
 def doubt_about_step(setup: Setup) -> str:

@@ -6,6 +6,7 @@ import dataclasses
 import functools
 import operator
 import reprlib
+import types
 import typing
 from collections.abc import Callable
 from typing import Any, ClassVar, TypeVar
@@ -113,6 +114,17 @@ def item_type(kind: Any) -> Any:
     return of[0] if is_list else None
 
 
+def optional_type(kind: Any) -> Any:
+    """The type of a field that may be None, when it is not; None for other fields.
+
+    Args:
+        kind: the type of a field; `float | None` is a float that may be None.
+    """
+    of = typing.get_args(kind)
+    is_optional = isinstance(kind, types.UnionType) and len(of) == 2 and of[1] is type(None)
+    return of[0] if is_optional else None
+
+
 def one_line(error: Exception) -> str:
     """The message of an error, on one line.
 
@@ -132,6 +144,8 @@ def _hashable(value: Any) -> Any:
 
 def _convert(value: Any, kind: Any) -> Any:
     """The value as `kind`, without guessing: neither text nor truth values count as numbers."""
+    if optional_type(kind) is not None:
+        return None if value is None else _convert(value, optional_type(kind))
     if kind is float:
         if isinstance(value, (bool, str)) or not hasattr(type(value), "__float__"):
             raise TypeError(f"must be a number, got {reprlib.repr(value)}")

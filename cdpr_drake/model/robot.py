@@ -240,6 +240,8 @@ class CableRobot(Record):
         winch: the winches.
         cameras: the cameras.
         load_cells: the load cells.
+        gain: lambda [1/s] of its control law where nobody asks for another; if None, what
+            `study.default_gain` finds.
         sources: where the values come from, by field (`cable.section`) or group (`cable`).
         assumptions: what is assumed rather than known.
 
@@ -258,6 +260,7 @@ class CableRobot(Record):
     winch: Winch
     cameras: Cameras
     load_cells: LoadCells
+    gain: float | None = None
     sources: dict[str, str] = field(default_factory=dict)
     assumptions: tuple[str, ...] = ()
 

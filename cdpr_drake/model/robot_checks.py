@@ -99,9 +99,11 @@ def value_problems(robot: CableRobot) -> Problems:
     for path in _FINITE:
         yield from _require(robot, path, np.isfinite, "finite")
     for path in _POSITIVE:
-        yield from _require(robot, path, lambda v: np.isfinite(v) & (v > 0), "positive and finite")
+        yield from _positive(robot, path)
     for path in _NOT_NEGATIVE:
         yield from _require(robot, path, lambda v: np.isfinite(v) & (v >= 0), ">= 0 and finite")
+    if robot.gain is not None:
+        yield from _positive(robot, "gain")
     for name in ("X_WF", "X_PM"):
         X: Any = getattr(robot.cameras, name)
         if not (np.all(np.isfinite(X.GetAsMatrix34())) and X.rotation().IsValid()):
@@ -141,6 +143,10 @@ def _shapes(robot: CableRobot) -> Problems:
         got = attrgetter(path)(robot).shape
         if got != shape:
             yield path, f"must have shape {shape}, got {got}"
+
+
+def _positive(robot: CableRobot, path: str) -> Problems:
+    yield from _require(robot, path, lambda v: np.isfinite(v) & (v > 0), "positive and finite")
 
 
 def _require(robot, path: str, test, wanted: str) -> Problems:  # type: ignore[no-untyped-def]

@@ -23,7 +23,15 @@ from pydrake.common.yaml import yaml_dump_typed, yaml_load_typed
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.model.records import Record, cached, field_types, is_record, item_type, one_line
+from cdpr_drake.model.records import (
+    Record,
+    cached,
+    field_types,
+    is_record,
+    item_type,
+    one_line,
+    optional_type,
+)
 
 R = TypeVar("R", bound=Record)
 
@@ -120,6 +128,8 @@ def _build(cls: type[R], schema: Any) -> R:
 
 
 def _build_value(kind: Any, value: Any) -> Any:
+    if optional_type(kind) is not None:
+        return None if value is None else _build_value(optional_type(kind), value)
     item, items = item_type(kind), []
     if item is not None:
         for index, entry in enumerate(value):
@@ -168,6 +178,10 @@ def _inspect_keys(node: yaml.Node | None, where: str) -> None:
 def _inspect(value: Any, kind: Any) -> None:
     """Raises RobotFileError if a parsed YAML value does not have the form of `kind`."""
     got = f"got {reprlib.repr(value)}"
+    if optional_type(kind) is not None:
+        if value is None:
+            return
+        kind = optional_type(kind)
     if kind is RigidTransform:
         kind = _Pose
     if is_record(kind):

@@ -21,6 +21,9 @@ from cdpr_drake.model.rotations import (
 )
 from cdpr_drake.model.statics import check_rank, wrench_matrix
 
+CUSTOMARY_GAIN = 0.1
+"""lambda [1/s] where nobody says otherwise: the paper's are from 0.03 to 0.1."""
+
 
 def pose_error(
     pose: RigidTransform | ArrayLike,
@@ -87,7 +90,7 @@ class ServoSettings:
 
     cable_model: str = "SCMWE"
     order: int = 4
-    gain: float = 0.1
+    gain: float = CUSTOMARY_GAIN
     ramp_time: float = 1.0
     max_speed: float = np.inf
     max_angular_speed: float = np.inf

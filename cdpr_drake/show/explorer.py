@@ -130,7 +130,9 @@ class Explorer:
         mass = self._robot.payload.mass
         most = _rounded_up(max(3.0 * self._robot.platform.mass, 2.0 * mass))
         self._add_slider(PAYLOAD, 0.0, most, 1.0, mass)
-        self._add_slider(GAIN, 0.01, max(5.0, gain), 0.01, gain)
+        # Meshcat rounds to steps: a small gain needs small ones, not to become another, or zero.
+        step = min(0.01, 10.0 ** (math.floor(math.log10(gain)) - 1))
+        self._add_slider(GAIN, step, max(5.0, gain), step, gain)
         self.meshcat.AddButton(STOP)
 
     def _add_slider(self, name: str, low: float, high: float, step: float, value: float) -> None:

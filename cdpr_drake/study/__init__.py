@@ -6,6 +6,7 @@ from cdpr_drake.study.compare import (
     comparable_pose,
     compare_cable_models,
 )
+from cdpr_drake.study.default_gain import DefaultGain, default_gain, lowest_gain
 from cdpr_drake.study.equilibrium import Residuals, equilibrium, residuals, true_pose
 from cdpr_drake.study.explore import Snapshot, explore_pose
 from cdpr_drake.study.gain_matrix import GainMap, GainMatrix, gain_matrix, map_gain_matrix
@@ -46,6 +47,7 @@ from cdpr_drake.study.sweep import Outcome, Sweep, sweep
 
 __all__ = [
     "Comparison",
+    "DefaultGain",
     "GainBand",
     "GainLimit",
     "GainMap",
@@ -71,6 +73,7 @@ __all__ = [
     "Sweep",
     "comparable_pose",
     "compare_cable_models",
+    "default_gain",
     "equilibrium",
     "excursion",
     "explore_pose",
@@ -81,6 +84,7 @@ __all__ = [
     "internal_tension",
     "internal_tension_drift",
     "linearize",
+    "lowest_gain",
     "map_gain_matrix",
     "modes",
     "neutral_directions",

@@ -229,7 +229,12 @@ def gain_limit(
 
 
 def find_gain_limit(
-    servo: SampledServo, latency: float, *, highest: float | None = None, points: int = 120
+    servo: SampledServo,
+    latency: float,
+    *,
+    highest: float | None = None,
+    points: int = 120,
+    lowest: float = LOWEST_GAIN,
 ) -> GainLimit:
     """Return the gain limit of a loop that is already set up; see `gain_limit`.
 
@@ -238,9 +243,10 @@ def find_gain_limit(
         latency: [s].
         highest: gain [1/s] to search up to; 0.99 / T if None.
         points: number of gains to scan.
+        lowest: gain [1/s] to search from.
     """
     top = 0.99 / servo.sample_time if highest is None else highest
-    gains = np.geomspace(LOWEST_GAIN, top, points)
+    gains = np.geomspace(lowest, top, points)
 
     def growth(gain: float) -> float:
         return servo.growth(gain, latency).real
@@ -265,7 +271,7 @@ def find_gain_limit(
             gain=math.inf, mode="", frequency=math.nan, unstable=(), searched=float(top)
         )
     limit = unstable[0][0]
-    found, critical = servo.critical(max(limit, LOWEST_GAIN) * (1.0 + 1e-6), latency)
+    found, critical = servo.critical(max(limit, lowest) * (1.0 + 1e-6), latency)
     return GainLimit(
         gain=limit,
         mode=found.name(critical),
