@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import importlib.util
+import json
 import math
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform
 from study_samples import POSE, miscalibrated
 
 from cdpr_drake.diagrams import make_vision_based_control
-from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.experiments.moves import move_near_the_middle
+from cdpr_drake.experiments.paper_tests import paper_test
+from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.study import (
     SampledServo,
     StabilityWarning,
     equilibrium,
     gain_limit,
+    gain_limit_band,
     one_period_map,
     platform_modes,
     simulate_modes,
@@ -22,6 +30,8 @@ from cdpr_drake.study import (
     warn_if_unstable,
 )
 from cdpr_drake.study.stability import find_gain_limit
+
+DOCS = Path(__file__).parents[1] / "docs"
 
 
 def with_damping(robot: CableRobot, damping_time: float) -> CableRobot:
@@ -163,3 +173,64 @@ def test_the_limit_is_bracketed_in_simulation(cogiro: CableRobot, factor: float)
     (mode,) = simulate_modes(loop, equilibrium(loop, POSE), 15.0)
     assert math.copysign(1.0, mode.growth) == math.copysign(1.0, factor - 1.0)
     assert mode.growth == pytest.approx(mode.predicted.real, rel=0.02)
+
+
+# --- damping that only what stretches has
+
+
+@pytest.mark.parametrize(
+    ("number", "end", "limit"),
+    [(1, 0, 0.636), (1, 1, 0.473), (4, 0, 2.716), (4, 1, 1.465), (5, 1, 1.084)],
+)
+def test_limits_on_the_papers_robot(
+    cogiro: CableRobot, number: int, end: int, limit: float
+) -> None:
+    """Beside values that another program found for static cables damped by their stretch."""
+    test = paper_test(number)
+    found = gain_limit(test.carried_by(cogiro), test.poses(cogiro)[end])
+    assert found.gain == pytest.approx(limit, rel=0.005)
+
+
+def test_limits_of_a_robot_that_sags() -> None:
+    large = load_robot("cogiro-98m")
+    assert gain_limit(large, RigidTransform()).gain == pytest.approx(0.062, rel=0.02)
+    assert gain_limit(large, RigidTransform([20.0, 0, 0])).gain == pytest.approx(0.0017, rel=0.05)
+
+
+@pytest.mark.parametrize("name", ["cogiro", "cogiro-37m", "cogiro-98m"])
+def test_a_band_holds_the_limits_of_its_loss_factors(name: str) -> None:
+    robot = load_robot(name)
+    _, pose = move_near_the_middle(robot)
+    band = gain_limit_band(robot, pose)
+    assert 0.0 < band.lowest < 0.5 * band.highest
+    for factor, time, limit in zip(band.loss_factors, band.damping_times, band.limits, strict=True):
+        assert time * 2.0 * np.pi * limit.frequency == pytest.approx(factor, rel=0.02)
+        alone = gain_limit(with_damping(robot, time), pose)
+        assert limit.gain == pytest.approx(alone.gain, rel=1e-5)
+    text = str(band)
+    assert f"{band.lowest:.3g} to {band.highest:.3g}/s" in text and "0.01 to 0.1" in text
+    with pytest.raises(ValueError, match="positive"):
+        gain_limit_band(robot, pose, loss_factors=[0.0])
+
+
+@pytest.mark.parametrize("x", [0.0, 20.0])
+def test_an_undamped_slow_mode_grows_at_half_the_gain_and_drag_stops_it(x: float) -> None:
+    """Where the delay is short beside its period: m x'' = -k (x - u), u' = -lambda x."""
+    robot, pose, gain = with_damping(load_robot("cogiro-98m"), 0.0), RigidTransform([x, 0, 0]), 0.06
+    assert SampledServo(robot, pose).growth(gain, 0.04).real == pytest.approx(0.03, rel=0.1)
+    assert SampledServo(robot, pose, drag=0.045).growth(gain, 0.04).real > 0.0
+    assert SampledServo(robot, pose, drag=0.065).growth(gain, 0.04).real < 0.0
+
+
+def test_the_page_on_damping_has_what_is_computed() -> None:
+    spec = importlib.util.spec_from_file_location("make_damping", DOCS / "make_damping.py")
+    assert spec is not None and spec.loader is not None
+    script = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = script
+    spec.loader.exec_module(script)
+    page = (DOCS / "damping.md").read_text(encoding="utf-8")
+    before = json.loads((DOCS / "damping_before.json").read_text(encoding="utf-8"))
+    rows = list(script.places())
+    assert len(before) == len(rows) == page.count("| cogiro")
+    for row in (rows[6], rows[11], rows[14]):
+        assert script.line(row, before) in page
