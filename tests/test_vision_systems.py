@@ -26,7 +26,6 @@ from cdpr_drake.model.rotations import pose_to_vector
 from cdpr_drake.model.vision.outages import Outage
 from cdpr_drake.systems import (
     LoadCellFilter,
-    PlausibleTension,
     StereoTangentCameras,
     TargetCameras,
 )
@@ -269,14 +268,6 @@ def test_vibration_has_its_amplitude_and_band(cogiro: CableRobot) -> None:
     assert power[outside].sum() < 1e-2 * power.sum()
     correlation = np.corrcoef(vibration.T) - np.eye(8)
     assert np.abs(correlation).max() < 0.95
-
-
-def test_readings_near_zero_are_replaced(cogiro: CableRobot) -> None:
-    system = PlausibleTension(cogiro)  # min_tension 100 N, max_tension 5000 N
-    readings = np.array([-20.0, 0.0, 49.9, 50.0, 51.0, 300.0, 5000.0, 9000.0])
-    context = fixed_context(system, {"measured_tension": readings})
-    got = system.GetOutputPort("plausible_tension").Eval(context)
-    np.testing.assert_array_equal(got, [5000.0] * 3 + [50.0, 51.0, 300.0, 5000.0, 9000.0])
 
 
 def test_an_outage_says_what_is_wrong_with_it() -> None:
