@@ -330,6 +330,25 @@ def test_a_loop_reports_its_cells(cogiro: CableRobot, latency: float, noise: boo
     assert np.linalg.norm(record["pose_error"][-1, 3:]) < 0.07
 
 
+@pytest.mark.parametrize("cells", [(1, 3, 5), (None,)], ids=["three", "all"])
+@pytest.mark.parametrize("reading", [0.0, None], ids=["dead", "stuck"])
+def test_no_cable_is_torn_where_many_cells_fail(
+    cogiro: CableRobot, cells: tuple[int | None, ...], reading: float | None
+) -> None:
+    start, goal = paper_test(4).poses(cogiro)
+    outages = tuple(
+        Outage(sensor="load cell", number=cell, start=0.5, reading=reading) for cell in cells
+    )
+    loop = make_vision_based_control(cogiro, gain=0.5, noise=True, outages=outages)
+    context = rest_context(loop, start, seed=2)
+    loop.GetInputPort("desired_pose").FixValue(context, pose_to_vector(goal))
+    record = simulate(loop, context, 12.0, record=["tension_at_winch", "pose_error"])
+    # As with healthy cells: 189 N are the lowest, 438 N at rest the highest.
+    tension = record["tension_at_winch"]
+    assert tension.min() > 170.0 and tension.max() < 470.0
+    assert np.linalg.norm(record["pose_error"][-1, 3:]) < 0.01
+
+
 def test_light_readings_pass_the_system(cogiro: CableRobot) -> None:
     """A system without memory: low readings that are to be expected stay, others go over."""
     pose = np.array(REST)
