@@ -136,7 +136,9 @@ def test_covariances_of_poses_are_those_of_samples() -> None:
     roots = [1e-3 * generator.standard_normal((6, 6)) for _ in range(2)]
     A, B = (UncertainPose(X=P, covariance=L @ L.T) for P, L in zip((X, Y), roots, strict=True))
     joint = 1e-3 * generator.standard_normal((12, 12))
-    relative = between(X, Y, joint @ joint.T)
+    fixed = 0.25 * joint @ joint.T
+    relative = between(X, Y, joint @ joint.T, fixed)
+    np.testing.assert_allclose(relative.fixed_covariance, 0.25 * relative.covariance, rtol=1e-9)
     product, inverse = A @ B, A.inverse()
     draws: dict[str, list[np.ndarray]] = {"product": [], "inverse": [], "between": []}
     for _ in range(900):
@@ -292,12 +294,59 @@ def test_cameras_and_transforms_scatter_as_predicted(robot: CableRobot) -> None:
     assert is_chi_square(of_platform, transforms.freedom)
 
 
+class Silent(np.random.Generator):
+    """A generator of noise that draws zeros only."""
+
+    def standard_normal(self, size: Any = None, *_: Any, **__: Any) -> Any:
+        return np.zeros(size)
+
+
+def test_the_fixed_part_of_the_transforms_is_that_of_the_biases(robot: CableRobot) -> None:
+    """Over biases without noise the fixed part; over noise with the same bias the other."""
+    poses = platform_poses(robot, QUICK.poses, QUICK.turn)
+    squares: dict[str, list[float]] = {"bias": [], "noise": []}
+    for kind, found in squares.items():
+        results = []
+        for seed in range(24):
+            fixed = robot.cameras.replace(pixel_bias_seed=seed if kind == "bias" else 1)
+            drawn = robot.replace(cameras=fixed)
+            bits = np.random.PCG64(seed)
+            draw = Silent(bits) if kind == "bias" else np.random.Generator(bits)
+            place = Site(drawn, QUICK, TargetImages(drawn), draw)
+            cameras = [place.see_camera(camera) for camera in drawn.cameras.pose_cameras]
+            results.append(place.see_platform(cameras, poses).X_PM)
+        errors = np.array([difference(X.X, robot.cameras.X_PM) for X in results])
+        if kind == "bias":
+            covariance = results[0].fixed_covariance
+        else:  # what all have in common is the bias
+            covariance = results[0].noise_covariance
+            errors = (errors - errors.mean(axis=0)) * np.sqrt(24.0 / 23.0)
+        found += np.einsum("ni,ij,nj->n", errors, np.linalg.inv(covariance), errors).tolist()
+    assert is_chi_square(squares["bias"], 6) and is_chi_square(squares["noise"], 6)
+
+
+def test_the_parts_of_the_points_errors(robot: CableRobot) -> None:
+    """Where the cables bend is fixed; without it the noise alone scatters."""
+    sure = QUICK.replace(drawing_point=0.0, attachment_point=0.0)
+    scores = []
+    for seed in range(40):
+        _, A, B = site(robot, sure, seed).measure_points()
+        assert np.all(A.fixed_sigmas == 0.0) and np.all(B.fixed_sigmas == 0.0)
+        scores.append(((A.points - robot.drawing_points) / A.noise_sigmas).ravel())
+        scores.append(((B.points - robot.attachment_points) / B.noise_sigmas).ravel())
+    assert np.std(scores) == pytest.approx(1.0, abs=0.07)
+    _, A, B = site(robot, QUICK, 0).measure_points()
+    np.testing.assert_array_equal(A.fixed_sigmas, QUICK.drawing_point)
+    np.testing.assert_array_equal(B.fixed_sigmas, QUICK.attachment_point)
+    assert A.noise_sigmas.max() < QUICK.drawing_point
+
+
 def test_points_scatter_as_predicted(robot: CableRobot) -> None:
     scores = []
     for seed in range(40):
-        _, A, sigma_A, B, sigma_B = site(robot, QUICK, seed).measure_points()
-        scores.append(((A - robot.drawing_points) / sigma_A).ravel())
-        scores.append(((B - robot.attachment_points) / sigma_B).ravel())
+        _, A, B = site(robot, QUICK, seed).measure_points()
+        scores.append(((A.points - robot.drawing_points) / A.sigmas).ravel())
+        scores.append(((B.points - robot.attachment_points) / B.sigmas).ravel())
     z = np.array(scores)
     assert abs(np.mean(z**2) - 1.0) < 4.0 * math.sqrt(2.0 / z.size)
 
@@ -393,9 +442,10 @@ def test_frames_need_three_points_off_a_line() -> None:
     known, X = generator.standard_normal((3, 3)), random_pose(generator)
     found = register(known, at(X, known), 1e-3)
     assert np.abs(difference(found.X, X)).max() < 1e-12
-    back, sigmas = locate(found, at(X, known), 1e-6)
-    np.testing.assert_allclose(back, known, atol=1e-12)
-    assert np.all(sigmas > 1e-3)
+    back = locate(found, at(X, known), 1e-6, 4e-6)
+    np.testing.assert_allclose(back.points, known, atol=1e-12)
+    assert np.all(back.noise_sigmas > 1e-3) and np.all(back.fixed_sigmas == 2e-3)
+    assert np.all(back.sigmas > np.sqrt(5.0) * 1e-3)
     for points, message in (
         (known[:2], "at least 3 reference points, got 2"),
         (np.outer([0.0, 1.0, 3.0], [1.0, 2.0, 3.0]), "lie on one line"),

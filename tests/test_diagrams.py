@@ -129,6 +129,7 @@ VBC_SIZES = {
     "measured_pose": 6,
     "measured_tangents": 24,
     "measured_tension": 8,
+    "cell_health": 8,
     "commanded_motor_rates": 8,
     "desired_motor_angles": 8,
 } | ROBOT_SIZES
@@ -232,6 +233,7 @@ def test_the_feedthrough_of_the_diagrams(cogiro: CableRobot) -> None:
     seen = {
         ("pose_noise", "measured_pose"),
         ("pose_noise", "pose_error_seen"),
+        ("pose_noise", "cell_health"),
         ("tangent_noise", "measured_tangents"),
     }
     assert feedthrough(LOOPS["latency 0 ms"](cogiro)) == sampled | seen

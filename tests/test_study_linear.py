@@ -180,11 +180,12 @@ def test_each_discrete_state_has_the_name_of_its_place(cogiro: CableRobot) -> No
     for mark in (1.0, 2.0, 3.0):
         delay.get_input_port().FixValue(own, np.full(6, mark))
         own.SetDiscreteState(delay.EvalUniquePeriodicDiscreteUpdate(own).value())
-    groups = [context.get_discrete_state(i).CopyToVector() for i in range(4)]
+    groups = [context.get_discrete_state(i).CopyToVector() for i in range(5)]
     names = discrete_state_names(diagram)
     d = dict(zip(names, np.concatenate(groups), strict=True))
     assert d["sampled_pose/yaw"] == 3.0
     assert d["sampled_pose/1_frames_ago/x"] == 2.0 and d["sampled_pose/2_frames_ago/roll"] == 1.0
+    assert d["plausible_tension/last_change[1]"] > 100.0 and d["plausible_tension/stuck[8]"] == 0.0
     assert "held_rates[8]" in d and "sampled_tangents/1_frames_ago[3]/z" in d
 
 

@@ -164,7 +164,7 @@ def test_the_parts_of_the_loop(cogiro: CableRobot) -> None:
     loop = make_vision_based_control(cogiro, latency=0.07)
     model = hybrid_model(loop, equilibrium(loop, POSE))
     offsets = sorted(offset for offset, _, _ in model.events)
-    assert offsets == pytest.approx([0.0, 0.0, 0.0, 0.02])
+    assert offsets == pytest.approx([0.0, 0.0, 0.0, 0.0, 0.02])
     held = [i for i, name in enumerate(model.states[52:]) if name.startswith("held_rates")]
     np.testing.assert_array_equal(np.flatnonzero(model.E.any(axis=0)), held)
     np.testing.assert_allclose(model.flow(0.01) @ model.flow(0.02), model.flow(0.03), atol=1e-9)
@@ -233,6 +233,6 @@ def test_an_open_port_is_named(cogiro: CableRobot) -> None:
 def test_the_map_says_what_it_is(cogiro: CableRobot) -> None:
     loop = make_vision_based_control(cogiro, latency=0.0)
     assert repr(one_period_map(loop, equilibrium(loop, POSE))) == (
-        "<OnePeriodMap: 60 states, period 0.05 s>"
+        "<OnePeriodMap: 84 states, period 0.05 s>"
     )
     assert math.isclose(one_period_map(loop, equilibrium(loop, POSE)).period, 0.05)

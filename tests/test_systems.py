@@ -49,7 +49,7 @@ MAKE: dict[str, tuple[Callable[[CableRobot], LeafSystem], tuple[str, ...]]] = {
         lambda r: systems.LoadCellFilter(r, misplaced(r)),
         ("robot", "calibrated", "outages"),
     ),
-    "PlausibleTension": (lambda r: systems.PlausibleTension(r), ("robot",)),
+    "PlausibleTension": (lambda r: systems.PlausibleTension(r), ("robot", "sample_time")),
     "PositionBasedVisualServo": (
         lambda r: systems.PositionBasedVisualServo(r, SETTINGS),
         ("robot", "settings"),
@@ -82,7 +82,7 @@ INPUTS: dict[str, dict[str, int]] = {
     "CameraMeasurement": {"pose": 6, "noise": 6},
     "CableTangentCameras": {"tangents": 3 * K, "noise": 3 * K},
     "LoadCellFilter": {"tension_at_winch": K, "noise": K},
-    "PlausibleTension": {"measured_tension": K},
+    "PlausibleTension": {"measured_pose": 6, "measured_tension": K},
     "PositionBasedVisualServo": {
         "measured_pose": 6,
         "measured_tangents": 3 * K,
@@ -118,7 +118,7 @@ OUTPUTS: dict[str, dict[str, int]] = {
     "CameraMeasurement": {"measured_pose": 6},
     "CableTangentCameras": {"measured_tangents": 3 * K},
     "LoadCellFilter": {"measured_tension": K},
-    "PlausibleTension": {"plausible_tension": K},
+    "PlausibleTension": {"plausible_tension": K, "cell_health": K},
     "PositionBasedVisualServo": {"motor_rates": K, "pose_error": 6},
     "PoseError": {"pose_error": 6},
     "MotorAngleIntegrator": {"motor_angles": K},

@@ -418,3 +418,40 @@ def test_the_fixed_bias_shifts_the_pose_within_its_covariance(cogiro: CableRobot
         error = motion(CENTRE, got.X_WP)
         squares.append(error @ np.linalg.solve(got.covariance, error))
     assert abs(sum(squares) - 360.0) < 4.0 * np.sqrt(720.0)
+
+
+@pytest.mark.parametrize("estimator", ["joint", "mean"])
+def test_one_part_of_the_covariance_averages_out_and_the_other_does_not(
+    cogiro: CableRobot, estimator: str
+) -> None:
+    """Over noise with one fixed bias the one part; over biases without noise the other."""
+    frames = 200 if estimator == "joint" else 60
+
+    def poses(bias_seed: int, noise: np.random.Generator | None, count: int) -> list[PoseEstimate]:
+        cameras = cogiro.cameras.replace(pixel_bias_seed=bias_seed)
+        robot = cogiro.replace(cameras=cameras)
+        images, estimate = TargetImages(robot), PoseEstimator(robot, estimator)
+        found = []
+        for _ in range(count):
+            draw = None if noise is None else noise.standard_normal(images.noise_size)
+            found.append(estimate(images(CENTRE, draw), CENTRE))
+        assert all(f is not None for f in found)
+        return found
+
+    noisy = poses(1, np.random.default_rng(3), frames)
+    E = np.array([motion(CENTRE, e.X_WP) for e in noisy])
+    scatter = E - E.mean(axis=0)
+    spread = np.einsum("ni,ij,nj->n", scatter, np.linalg.inv(noisy[0].noise_covariance), scatter)
+    freedom = 6.0 * (frames - 1)
+    assert abs(spread.sum() / freedom - 1.0) < (0.1 if estimator == "joint" else 0.3)
+    # The mean of all frames keeps the bias: more than noise explains, no more than bias does.
+    left = E.mean(axis=0)
+    assert left @ np.linalg.solve(noisy[0].noise_covariance / frames, left) > 60.0
+    assert left @ np.linalg.solve(noisy[0].fixed_covariance, left) < 25.0
+
+    still = [poses(seed, None, 1)[0] for seed in range(frames)]
+    E = np.array([motion(CENTRE, e.X_WP) for e in still])
+    spread = np.einsum("ni,ij,nj->n", E, np.linalg.inv(still[0].fixed_covariance), E)
+    assert abs(spread.sum() / (6.0 * frames) - 1.0) < (0.1 if estimator == "joint" else 0.3)
+    both = still[0].noise_covariance + still[0].fixed_covariance
+    np.testing.assert_array_equal(still[0].covariance, both)

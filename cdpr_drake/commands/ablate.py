@@ -92,7 +92,8 @@ def _lines(found: Sequence[Ablation]) -> Iterator[str]:
                 yield from wrapped(f"{row.sensors.label}, seed {seed}: {reason}")
         yield ""
     yield from wrapped(
-        "Means over the seeds, +- the standard deviation of one run; - where a run did not get "
+        "Means over the seeds, +- the standard deviation of one run over noise and fixed biases, "
+        "which a seed draws both; - where a run did not get "
         "there. * differs from all sensors by more than 3 standard errors of the difference, taken "
         "seed by seed, and by more than 1 %. Error: true, of the last second. To 2 %: from then on "
         "the error is below 2 % of the first. Strays: farthest from the straight way. Tension: "

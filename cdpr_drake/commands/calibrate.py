@@ -63,6 +63,12 @@ def _columns(found: Calibration) -> list[Column]:
         Column(heading=("rms error", "per axis"), cells=[_digits(g.rms_error) for g in groups]),
         Column(heading=("predicted", "1 sigma"), cells=[_digits(g.rms_sigma) for g in groups]),
         Column(
+            heading=("of it", "noise"), cells=[_digits(g.rms_noise_sigma) for g in groups], rank=1
+        ),
+        Column(
+            heading=("of it", "fixed"), cells=[_digits(g.rms_fixed_sigma) for g in groups], rank=1
+        ),
+        Column(
             heading=("largest", "error"),
             cells=[_digits(abs(g.errors[g.largest])) for g in groups],
             rank=1,
@@ -86,7 +92,9 @@ def _meaning(found: Calibration) -> str:
     noise = {0.0: "no noise", 1.0: "the usual noise"}.get(scale, f"{scale:g} times the usual noise")
     return (
         f"{found.true.name} calibrated with {noise}, seed {found.seed}: calibrated less true, and "
-        "the standard deviation that the measurements predict. A_i and B_i are known as well as "
+        "the standard deviation that the measurements predict: of noise, which calibrating again "
+        "would average out, and of what stays fixed, which are the bends of the cables and the "
+        "bias of each point of the patterns. A_i and B_i are known as well as "
         "one can say where the cable bends; X_WF and X_PM as well as poses that turn by "
         f"{np.degrees(found.setup.turn):g} deg tell the one from the other, so their errors go "
         "together."
@@ -121,9 +129,13 @@ def _summary(found: Calibration, errors: np.ndarray) -> dict[str, Any]:
                 "unit": g.unit,
                 "rms_error": g.rms_error,
                 "rms_sigma": g.rms_sigma,
+                "rms_noise_sigma": g.rms_noise_sigma,
+                "rms_fixed_sigma": g.rms_fixed_sigma,
                 "labels": list(g.labels),
                 "errors": g.errors.tolist(),
                 "sigmas": g.sigmas.tolist(),
+                "noise_sigmas": g.noise_sigmas.tolist(),
+                "fixed_sigmas": g.fixed_sigmas.tolist(),
             }
             for g in found.groups
         },

@@ -64,6 +64,7 @@ def make_vision_based_control(
         - measured_pose
         - measured_tangents
         - measured_tension
+        - cell_health
         - commanded_motor_rates
         - desired_motor_angles
         - those of make_cable_robot
@@ -167,14 +168,16 @@ def make_vision_based_control(
         if sees and cells is None:
             held.add("tension")
         measured, rates = _sample(builder, measured, held, rates, sample_time, latency)
-    plausible = builder.AddNamedSystem("plausible_tension", PlausibleTension(believed))
-    builder.Connect(measured["tension"], plausible.get_input_port())
+    plausible = builder.AddNamedSystem("plausible_tension", PlausibleTension(believed, sample_time))
+    plausible_tension = plausible.GetOutputPort("plausible_tension")
+    for name in ("pose", "tension"):
+        builder.Connect(measured[name], plausible.GetInputPort(f"measured_{name}"))
     if tangents is None:
         model = builder.AddNamedSystem("tangent_model", ModelledTangents(believed))
         builder.Connect(measured["pose"], model.GetInputPort("measured_pose"))
-        builder.Connect(plausible.get_output_port(), model.GetInputPort("measured_tension"))
+        builder.Connect(plausible_tension, model.GetInputPort("measured_tension"))
         measured["tangents"] = model.GetOutputPort("measured_tangents")
-    for name, port in (measured | {"tension": plausible.get_output_port()}).items():
+    for name, port in (measured | {"tension": plausible_tension}).items():
         builder.Connect(port, servo_law.GetInputPort(f"measured_{name}"))
     builder.Connect(rates, integrator.GetInputPort("motor_rates"))
 
@@ -188,6 +191,7 @@ def make_vision_based_control(
     builder.ExportOutput(error.GetOutputPort("pose_error"), "pose_error")
     for name, port in measured.items():
         builder.ExportOutput(port, f"measured_{name}")
+    builder.ExportOutput(plausible.GetOutputPort("cell_health"), "cell_health")
     builder.ExportOutput(rates, "commanded_motor_rates")
     angles = "desired_motor_angles" if fused else "motor_angles"
     builder.ExportOutput(integrator.GetOutputPort(angles), "desired_motor_angles")

@@ -18,6 +18,7 @@ from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, pose_to_vector
 from cdpr_drake.systems.fused_plant import FusedPlant
 from cdpr_drake.systems.held_pose import HeldPose
+from cdpr_drake.systems.plausible_tension import PlausibleTension
 from cdpr_drake.systems.stereo import StereoCameras
 
 
@@ -119,6 +120,9 @@ def _fill_samplers(systems: dict[tuple[str, ...], System], context: Context) -> 
             value = system.get_input_port().Eval(own)
             size = own.get_discrete_state_vector().size()
             own.SetDiscreteState(np.tile(value, size // value.size))
+    for system in systems.values():
+        if isinstance(system, PlausibleTension):  # whose inputs are samples
+            system.set_at_rest(system.GetMyMutableContextFromRoot(context))
 
 
 def leaf_systems(diagram: Diagram) -> Iterator[tuple[tuple[str, ...], Any]]:

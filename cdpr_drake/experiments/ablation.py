@@ -68,7 +68,8 @@ class Statistic:
 
     Attributes:
         mean: over the seeds; None if a run did not settle, or none came to its end.
-        deviation: standard deviation of one run.
+        deviation: standard deviation of one run, over white noise and the fixed bias of each point
+            together: a seed draws both, and a single robot keeps its biases.
         difference: mean of the differences to all sensors, seed by seed; None if there is none.
         uncertainty: standard error of that mean.
     """

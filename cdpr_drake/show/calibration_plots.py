@@ -30,6 +30,7 @@ PANELS = (
 def calibration_figure(calibration: Calibration) -> Figure:
     """Return a figure of the errors of all parameters, with bars of one predicted sigma.
 
+    The darker bar inside is the fixed part of it, which calibrating again would not average out.
     About two of three dots should be within their bars, and hardly one beyond three times as far;
     those are drawn as crosses. Below each group, the root mean squares of errors and of sigmas.
 
@@ -71,14 +72,18 @@ def _draw(axes: Axes, title: str, groups: list[ParameterGroup]) -> None:
 
 def _draw_group(axes: Axes, x: Any, group: ParameterGroup, first: bool) -> None:
     far = np.abs(group.errors) > np.maximum(3.0 * group.sigmas, 1e-9)
-    axes.bar(
-        x,
-        2.0 * group.sigmas,
-        bottom=-group.sigmas,
-        width=0.7,
-        color="0.85",
-        label="predicted, ±1σ" if first else None,
-    )
+    for sigmas, width, colour, label in (
+        (group.sigmas, 0.7, "0.85", "predicted, ±1σ"),
+        (group.fixed_sigmas, 0.4, "0.7", "the fixed part of it, ±1σ"),
+    ):
+        axes.bar(
+            x,
+            2.0 * sigmas,
+            bottom=-sigmas,
+            width=width,
+            color=colour,
+            label=label if first else None,
+        )
     for chosen, marker, colour, label in (
         (~far, "o", RUN_COLOURS[0], "error: calibrated less true"),
         (far, "X", RUN_COLOURS[1], "error beyond 3σ"),

@@ -26,8 +26,9 @@ PANELS = (
 def ablation_figure(ablations: Sequence[Ablation]) -> Figure:
     """Return what each set of sensors gives, a row of panels for each robot.
 
-    A dot is the mean over the seeds, its bar the standard deviation of one run; what differs from
-    all sensors by more than noise explains is filled with another colour. A set without a dot did
+    A dot is the mean over the seeds, its bar the standard deviation of one run, over white noise
+    and fixed biases together, which a seed draws both; what differs from all sensors by more than
+    these explain is filled with another colour. A set without a dot did
     not get there.
 
     Args:

@@ -20,6 +20,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.errors import CdprError
 from cdpr_drake.model.equilibrium import rest_state
 from cdpr_drake.model.kinematics import D_t
+from cdpr_drake.model.load_cells import CellJudge
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, pose_to_vector
 from cdpr_drake.model.servo import MotorRateLaw, ServoSettings
@@ -28,7 +29,6 @@ from cdpr_drake.study.names import TWIST
 from cdpr_drake.study.platform import RestModel, rest_model
 from cdpr_drake.study.response import excursion, free_response
 from cdpr_drake.study.state_space import Array
-from cdpr_drake.systems.plausible_tension import LEAST
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -215,7 +215,7 @@ class _Asker:
         self.believed = believed if believed is not None else robot
         fields = {**(vars(settings) if settings else {}), "cable_model": cable_model}
         self.law = MotorRateLaw(self.believed, ServoSettings(**fields))
-        self.cable_model = cable_model
+        self.cable_model, self.judge = cable_model, CellJudge(self.believed)
 
     def __call__(self, pose: RigidTransform | ArrayLike) -> GainMatrix:
         seen = as_pose(pose)
@@ -241,10 +241,9 @@ class _Asker:
         cells, ours = self.robot.load_cells, self.believed.load_cells
         tension = model.rest.tension_at_drawing_point
         measured = (cells.gain * tension + cells.bias - ours.bias) / ours.gain
-        # As the block "plausible_tension" does.
-        cable = self.believed.cable
-        measured = np.where(measured < LEAST * cable.min_tension, cable.max_tension, measured)
         vector = pose_to_vector(seen)
+        # As the block "plausible_tension" does.
+        measured = self.judge.plausible(vector, measured, self.judge.healthy)
         z = np.concatenate([vector, vector, np.zeros(6), measured, model.tangents.ravel()])
         k = self.robot.num_cables
         # The desired twist of E in W enters the law as it does the platform's: by D^_a.

@@ -85,6 +85,8 @@ def continuous_state_names(system: Any) -> tuple[str, ...]:
 def discrete_state_names(system: Any) -> tuple[str, ...]:
     """Return the names of a system's discrete states, group after group.
 
+    A leaf system may say what they are by an attribute `discrete_state_names`, one text for each.
+
     Args:
         system: a system or diagram.
     """
@@ -94,6 +96,10 @@ def discrete_state_names(system: Any) -> tuple[str, ...]:
             continue
         block = "/".join(path)
         sizes = group_sizes(leaf)
+        own = getattr(leaf, "discrete_state_names", None)
+        if own is not None and len(own) == sum(sizes):
+            names += [f"{block}/{name}" for name in own]
+            continue
         if isinstance(leaf, DiscreteTimeDelay):
             # The oldest sample comes first, the latest last.
             width = leaf.get_output_port().size()

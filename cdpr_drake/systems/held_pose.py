@@ -13,10 +13,10 @@ from cdpr_drake.model.rotations import Array, pose_to_vector, vector_to_pose
 from cdpr_drake.model.vision.pose import PoseEstimate
 from cdpr_drake.systems._template import part_of_state
 
-# The discrete state: pose, covariance, and what is counted.
-_POSE, _COVARIANCE = slice(0, 6), slice(6, 42)
-_FRAMES, _TARGETS, _CAMERAS, _AGE, _LOST, _IMAGES_LOST = range(42, 48)
-_SIZE = 48
+# The discrete state: pose, covariances, and what is counted.
+_POSE, _NOISE, _FIXED = slice(0, 6), slice(6, 42), slice(42, 78)
+_FRAMES, _TARGETS, _CAMERAS, _AGE, _LOST, _IMAGES_LOST = range(78, 84)
+_SIZE = 84
 
 
 class HeldPose(LeafSystem):
@@ -29,16 +29,19 @@ class HeldPose(LeafSystem):
         name: HeldPose
         output_ports:
         - measured_pose
-        - covariance
+        - noise_covariance
+        - fixed_covariance
         - num_targets
         - num_cameras
         - age
         - frames_lost
         - images_lost
 
-    measured_pose is [roll, pitch, yaw, x, y, z] (rad, m) of X_WP; covariance (36) is that of a
-    small motion [rotation vector; translation] of P in W [rad, m], row by row; num_targets and
-    num_cameras say how many points and cameras took part in the last frame; age [s] is how long ago
+    measured_pose is [roll, pitch, yaw, x, y, z] (rad, m) of X_WP; the covariances (36)
+    are of a small motion [rotation vector; translation] of P in W [rad, m], row by row: that of the
+    white noise, which averages out over frames, and that of the fixed bias of each point, which
+    does not; num_targets and num_cameras say how many points and cameras took part in the last
+    frame; age [s] is how long ago
     the pose held was measured; frames_lost counts the frames without a pose, images_lost the images
     of single cameras that were of no use. All is discrete state: no output depends on an input at
     once. OpenCV works on plain numbers, so there is no AutoDiffXd.
@@ -58,7 +61,8 @@ class HeldPose(LeafSystem):
         self.DeclarePeriodicDiscreteUpdateEvent(sample_time, 0.0, self._update)
         for name, part in (
             ("measured_pose", _POSE),
-            ("covariance", _COVARIANCE),
+            ("noise_covariance", _NOISE),
+            ("fixed_covariance", _FIXED),
             ("num_targets", slice(_TARGETS, _TARGETS + 1)),
             ("num_cameras", slice(_CAMERAS, _CAMERAS + 1)),
             ("age", slice(_AGE, _AGE + 1)),
@@ -130,6 +134,7 @@ class HeldPose(LeafSystem):
 def _record(state: Array, estimate: PoseEstimate) -> None:
     """Write an estimate into the discrete state."""
     state[_POSE] = pose_to_vector(estimate.X_WP)
-    state[_COVARIANCE] = estimate.covariance.ravel()
+    state[_NOISE] = estimate.noise_covariance.ravel()
+    state[_FIXED] = estimate.fixed_covariance.ravel()
     state[_FRAMES] += 1.0
     state[[_TARGETS, _CAMERAS, _AGE]] = estimate.num_targets, estimate.num_cameras, 0.0

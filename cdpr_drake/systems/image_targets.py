@@ -26,7 +26,8 @@ class ImageTargets(HeldPose):
         - image_1, ..., one per pose camera
         output_ports:
         - measured_pose
-        - covariance
+        - noise_covariance
+        - fixed_covariance
         - num_targets
         - num_cameras
         - age

@@ -28,7 +28,8 @@ class TargetCameras(HeldPose):
         - noise (optional)
         output_ports:
         - measured_pose
-        - covariance
+        - noise_covariance
+        - fixed_covariance
         - num_targets
         - num_cameras
         - age
@@ -39,12 +40,12 @@ class TargetCameras(HeldPose):
     and the pose is estimated with what the controller believes of cameras and patterns. Where too
     little is seen, the last pose is held. Poses are [roll, pitch, yaw, x, y, z] (rad, m) of X_WP;
     noise is standard normal, two numbers for each point in each camera, ignored if the port is left
-    open; covariance (36) is that of a small motion [rotation vector; translation] of P in W [rad,
-    m], row by row; num_targets and num_cameras say how many points and cameras took part in the
-    last frame; age [s] is how long ago the pose held was measured; frames_lost counts the frames
-    without a pose, images_lost the images of single cameras that were of no use. All is discrete
-    state: no output depends on an input at once. OpenCV works on plain numbers, so there is no
-    AutoDiffXd.
+    open; the covariances (36) are of a small motion [rotation vector; translation] of P in W [rad,
+    m], row by row, see `HeldPose`: noise averages out over frames, fixed bias does not; num_targets
+    and num_cameras say how many points and cameras took part in the last frame; age [s] is how long
+    ago the pose held was measured; frames_lost counts the frames without a pose, images_lost the
+    images of single cameras that were of no use. All is discrete state: no output depends on an
+    input at once. OpenCV works on plain numbers, so there is no AutoDiffXd.
 
     Args:
         robot: the true robot.

@@ -60,13 +60,13 @@ def calibrate(
     done = [site.see(eyes) for eyes in each([*cameras, *pairs], "cameras and pairs")]
     seen = [found for found in done if isinstance(found, CalibratedCamera)]
     seen_pairs = [found for found in done if isinstance(found, CalibratedPair)]
-    X_WS, A, sigma_A, B, sigma_B = site.measure_points()
+    X_WS, A, B = site.measure_points()
     transforms = site.see_platform(seen, poses)
-    believed = _believed(robot, X_WS, A, B, transforms, seen_pairs, setup, seed)
+    believed = _believed(robot, X_WS, A.points, B.points, transforms, seen_pairs, setup, seed)
     found = Believed(
         robot=believed,
-        sigma_A=sigma_A,
-        sigma_B=sigma_B,
+        A=A,
+        B=B,
         X_WF=X_WS @ transforms.X_SF,
         transforms=transforms,
         pairs=seen_pairs,

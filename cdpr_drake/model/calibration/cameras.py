@@ -33,7 +33,8 @@ class CalibratedCamera:
 
     Attributes:
         intrinsics: how it projects.
-        covariance: (9, 9), of [fx, fy, cx, cy, k1, k2, p1, p2, k3].
+        covariance: (9, 9), of [fx, fy, cx, cy, k1, k2, p1, p2, k3]; all of it is the white noise of
+            the corners, nothing fixed.
         X_CD: pose of the board in each view.
         cost: sum of squares of the corners' errors, in standard deviations.
         freedom: what the cost should be, on average.
@@ -53,7 +54,7 @@ class CalibratedPair:
     Attributes:
         left: how the left camera projects.
         right: how the right one does.
-        covariances: (9, 9) of each of the two.
+        covariances: (9, 9) of each of the two; all of it is white noise, as that of the poses is.
         X_LR: pose of the right camera in the left one.
         X_SL: pose of the left camera in the tracker's frame, if the tracker saw the board.
         cost: sum of squares of the errors, in standard deviations.

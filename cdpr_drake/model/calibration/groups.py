@@ -12,6 +12,7 @@ from cdpr_drake.model.calibration.cameras import CalibratedPair
 from cdpr_drake.model.calibration.motions import UncertainPose, difference
 from cdpr_drake.model.calibration.projection import PARAMETERS, as_vector
 from cdpr_drake.model.calibration.result import ParameterGroup
+from cdpr_drake.model.calibration.tracker import LocatedPoints
 from cdpr_drake.model.calibration.transforms import CalibratedTransforms
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array
@@ -31,23 +32,23 @@ class Believed:
 
     Attributes:
         robot: the robot.
-        sigma_A: (k, 3) [m].
-        sigma_B: (k, 3) [m].
+        A: the drawing points.
+        B: the attachment points.
         X_WF: the fixed camera frame.
         transforms: the other results of the poses of the platform.
         pairs: the stereo pairs.
     """
 
     robot: CableRobot
-    sigma_A: Array
-    sigma_B: Array
+    A: LocatedPoints
+    B: LocatedPoints
     X_WF: UncertainPose
     transforms: CalibratedTransforms
     pairs: Sequence[CalibratedPair]
 
 
 Named = tuple[str, UncertainPose, RigidTransform]
-Seen = tuple[str, Intrinsics, Array, Intrinsics]
+Seen = tuple[str, Intrinsics, Array, Array, Intrinsics]
 
 
 def parameter_groups(true: CableRobot, found: Believed, scale: float) -> tuple[ParameterGroup, ...]:
@@ -62,8 +63,8 @@ def parameter_groups(true: CableRobot, found: Believed, scale: float) -> tuple[P
     pairs = list(zip(found.pairs, true.cameras.stereo_pairs, strict=True))
     cameras = list(zip(found.transforms.X_FC, true.cameras.pose_cameras, strict=True))
     groups = [
-        _points("A_i", found.robot.drawing_points - true.drawing_points, found.sigma_A),
-        _points("B_i", found.robot.attachment_points - true.attachment_points, found.sigma_B),
+        _points("A_i", found.A, true.drawing_points),
+        _points("B_i", found.B, true.attachment_points),
         *_poses("X_WF", [("", found.X_WF, true.cameras.X_WF)]),
         *_poses("X_PM", [("", found.transforms.X_PM, true.cameras.X_PM)]),
         *_poses("X_FC", [(f"{i + 1}", X, c.X_FC) for i, (X, c) in enumerate(cameras) if i > 0]),
@@ -80,21 +81,34 @@ def parameter_groups(true: CableRobot, found: Believed, scale: float) -> tuple[P
     ]
     return tuple(
         ParameterGroup(
-            name=g.name, unit=g.unit, labels=g.labels, errors=g.errors, sigmas=scale * g.sigmas
+            name=g.name,
+            unit=g.unit,
+            labels=g.labels,
+            errors=g.errors,
+            noise_sigmas=scale * g.noise_sigmas,
+            fixed_sigmas=scale * g.fixed_sigmas,
         )
         for g in groups
     )
 
 
-def _points(name: str, errors: Array, sigmas: Array) -> ParameterGroup:
-    labels = tuple(f"{i + 1} {axis}" for i in range(len(errors)) for axis in "xyz")
+def _points(name: str, found: LocatedPoints, true: Array) -> ParameterGroup:
+    labels = tuple(f"{i + 1} {axis}" for i in range(len(true)) for axis in "xyz")
     return ParameterGroup(
         name=name,
         unit="mm",
         labels=labels,
-        errors=1e3 * errors.ravel(),
-        sigmas=1e3 * sigmas.ravel(),
+        errors=1e3 * (found.points - true).ravel(),
+        noise_sigmas=1e3 * found.noise_sigmas.ravel(),
+        fixed_sigmas=1e3 * found.fixed_sigmas.ravel(),
     )
+
+
+def _parts(covariances: Sequence[Array], fixed: Sequence[Array]) -> tuple[Array, Array]:
+    """Return the standard deviations (n, q) of noise and of what is fixed, of n covariances."""
+    total = np.array([np.diag(C) for C in covariances])
+    part = np.array([np.diag(C) for C in fixed])
+    return np.sqrt(np.maximum(total - part, 0.0)), np.sqrt(np.maximum(part, 0.0))
 
 
 def _poses(name: str, poses: Sequence[Named]) -> Iterator[ParameterGroup]:
@@ -102,7 +116,9 @@ def _poses(name: str, poses: Sequence[Named]) -> Iterator[ParameterGroup]:
     if not poses:
         return
     errors = np.array([difference(pose.X, true) for _, pose, true in poses])
-    sigmas = np.array([np.sqrt(np.diag(pose.covariance)) for _, pose, _ in poses])
+    noise, fixed = _parts(
+        [pose.covariance for _, pose, _ in poses], [pose.fixed_covariance for _, pose, _ in poses]
+    )
     labels = tuple(f"{which} {axis}".strip() for which, _, _ in poses for axis in "xyz")
     for what, unit, part, factor in (
         ("translation", "mm", slice(3, 6), 1e3),
@@ -113,28 +129,36 @@ def _poses(name: str, poses: Sequence[Named]) -> Iterator[ParameterGroup]:
             unit=unit,
             labels=labels,
             errors=factor * errors[:, part].ravel(),
-            sigmas=factor * sigmas[:, part].ravel(),
+            noise_sigmas=factor * noise[:, part].ravel(),
+            fixed_sigmas=factor * fixed[:, part].ravel(),
         )
 
 
 def _all_cameras(true: CableRobot, found: Believed) -> Iterator[Seen]:
-    """Yield a name, the camera found, its covariance, and the true camera."""
-    t = found.transforms
+    """Yield a name, the camera found, its covariance, the fixed part of that, the true camera."""
+    t, none = found.transforms, np.zeros((9, 9))
     for i, camera in enumerate(true.cameras.pose_cameras):
-        yield f"C{i + 1}", t.intrinsics[i], t.covariances[i], camera.intrinsics
+        yield (
+            f"C{i + 1}",
+            t.intrinsics[i],
+            t.covariances[i],
+            t.fixed_covariances[i],
+            camera.intrinsics,
+        )
     for i, (pair, known) in enumerate(zip(found.pairs, true.cameras.stereo_pairs, strict=True)):
-        yield f"L{i + 1}", pair.left, pair.covariances[0], known.left
-        yield f"R{i + 1}", pair.right, pair.covariances[1], known.right
+        yield f"L{i + 1}", pair.left, pair.covariances[0], none, known.left
+        yield f"R{i + 1}", pair.right, pair.covariances[1], none, known.right
 
 
 def _intrinsics(cameras: Sequence[Seen]) -> Iterator[ParameterGroup]:
-    errors = np.array([as_vector(seen) - as_vector(true) for _, seen, _, true in cameras])
-    sigmas = np.array([np.sqrt(np.diag(C)) for _, _, C, _ in cameras])
+    errors = np.array([as_vector(seen) - as_vector(true) for _, seen, _, _, true in cameras])
+    noise, fixed = _parts([C for _, _, C, _, _ in cameras], [D for _, _, _, D, _ in cameras])
     for name, unit, part, factor in INTRINSICS:
         yield ParameterGroup(
             name=name,
             unit=unit,
             labels=tuple(f"{camera} {p}" for camera, *_ in cameras for p in PARAMETERS[part]),
             errors=factor * errors[:, part].ravel(),
-            sigmas=factor * sigmas[:, part].ravel(),
+            noise_sigmas=factor * noise[:, part].ravel(),
+            fixed_sigmas=factor * fixed[:, part].ravel(),
         )

@@ -33,7 +33,8 @@ class Fit(Generic[State]):
 
     Attributes:
         state: where the residuals are least.
-        covariance: (s, s), of the shared parameters, as the residuals' standard deviations tell it.
+        covariance: (s, s), of the shared parameters, as the residuals' standard deviations tell it:
+            of noise and what is fixed together, where both are in these.
         cost: sum of squares of the residuals.
         freedom: number of residuals less the parameters: what the cost should be, on average.
     """
@@ -65,7 +66,7 @@ def minimise(
         CalibrationError: the residuals do not determine a parameter, or there is no convergence.
     """
     size, damping = len(names), 1e-6
-    N, g, cost, count = _normal_equations(blocks(state), size)
+    N, g, cost, count = normal_equations(blocks(state), size)
     for _ in range(MOST_STEPS):
         scale = _scale(N, names)
         scaled, slope = N / np.outer(scale, scale), g / scale
@@ -77,7 +78,7 @@ def minimise(
             covariance /= np.outer(of_shared, of_shared)
             return Fit(state=state, covariance=covariance, cost=cost, freedom=count - size)
         trial = move(state, step / scale)
-        new = _normal_equations(blocks(trial), size)
+        new = normal_equations(blocks(trial), size)
         if new[2] <= cost:
             state, (N, g, cost, _), damping = trial, new, max(0.1 * damping, 1e-12)
         else:
@@ -124,7 +125,13 @@ class _Reduced:
         return CalibrationError(f"the measurements do not determine {self._names[index]}")
 
 
-def _normal_equations(blocks: Iterable[Block], size: int) -> tuple[Array, Array, float, int]:
+def normal_equations(blocks: Iterable[Block], size: int) -> tuple[Array, Array, float, int]:
+    """Return N (p, p) and g (p,) of the equations N d = g, the cost, and the number of residuals.
+
+    Args:
+        blocks: the residuals.
+        size: number p of the parameters.
+    """
     N, g, cost, count = np.zeros((size, size)), np.zeros(size), 0.0, 0
     for r, J, columns in blocks:
         N[np.ix_(columns, columns)] += J.T @ J

@@ -6,7 +6,7 @@ motion of the inner frame's origin, and a turn about it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
@@ -47,32 +47,53 @@ class UncertainPose:
 
     Attributes:
         X: the pose.
-        covariance: (6, 6) [rad, m].
+        covariance: (6, 6) [rad, m], of all there is to err.
+        fixed_covariance: (6, 6) [rad, m], the part of it that measuring again leaves as it is.
     """
 
     X: RigidTransform
     covariance: Array
+    fixed_covariance: Array = field(default_factory=lambda: np.zeros((6, 6)))
+
+    @property
+    def noise_covariance(self) -> Array:
+        """The rest of it (6, 6): what the mean of n measurements has an n-th of."""
+        return self.covariance - self.fixed_covariance
 
     def inverse(self) -> UncertainPose:
         """Return the inverse."""
         J = inverse_jacobian(self.X)
-        return UncertainPose(X=self.X.inverse(), covariance=J @ self.covariance @ J.T)
+        return UncertainPose(
+            X=self.X.inverse(),
+            covariance=J @ self.covariance @ J.T,
+            fixed_covariance=J @ self.fixed_covariance @ J.T,
+        )
 
     def __matmul__(self, other: UncertainPose) -> UncertainPose:
         """Return the product with a pose whose errors are independent of this one's."""
         J, K = product_jacobians(self.X, other.X)
-        total = J @ self.covariance @ J.T + K @ other.covariance @ K.T
-        return UncertainPose(X=self.X @ other.X, covariance=total)
+        return UncertainPose(
+            X=self.X @ other.X,
+            covariance=J @ self.covariance @ J.T + K @ other.covariance @ K.T,
+            fixed_covariance=J @ self.fixed_covariance @ J.T + K @ other.fixed_covariance @ K.T,
+        )
 
 
-def between(X: RigidTransform, Y: RigidTransform, covariance: Array) -> UncertainPose:
+def between(
+    X: RigidTransform, Y: RigidTransform, covariance: Array, fixed_covariance: Array
+) -> UncertainPose:
     """Return X^-1 Y of two poses whose errors go together.
 
     Args:
         X: the one pose.
         Y: the other, in the same frame.
         covariance: (12, 12) [rad, m], of the motions of X and Y.
+        fixed_covariance: (12, 12) [rad, m], the fixed part of it.
     """
     of_inverse, of_Y = product_jacobians(X.inverse(), Y)
     J = np.hstack([of_inverse @ inverse_jacobian(X), of_Y])
-    return UncertainPose(X=X.inverse() @ Y, covariance=J @ covariance @ J.T)
+    return UncertainPose(
+        X=X.inverse() @ Y,
+        covariance=J @ covariance @ J.T,
+        fixed_covariance=J @ fixed_covariance @ J.T,
+    )

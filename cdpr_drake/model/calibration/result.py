@@ -21,19 +21,42 @@ from cdpr_drake.model.vision.targets import TargetImages
 class ParameterGroup:
     """Parameters of one kind, after a calibration.
 
+    What the measurements predict of the errors has two parts. Noise is new each time: calibrating n
+    times and taking the mean leaves an n-th of its variance. What is fixed comes out the same each
+    time: where a cable bends in the middle of the cloud of points around it, and the fixed bias of
+    each point of a pattern in each pose camera. A control loop lives with one calibration, so for
+    it both are one fixed error.
+
     Attributes:
         name: of the group.
         unit: of errors and standard deviations.
         labels: (n,), of the parameters.
         errors: (n,), calibrated less true.
-        sigmas: (n,), the standard deviations that the calibration predicts.
+        noise_sigmas: (n,), the standard deviations predicted of the noise.
+        fixed_sigmas: (n,), those of what is fixed.
     """
 
     name: str
     unit: str
     labels: tuple[str, ...]
     errors: Array
-    sigmas: Array
+    noise_sigmas: Array
+    fixed_sigmas: Array
+
+    @property
+    def sigmas(self) -> Array:
+        """Standard deviations of both parts together (n,), of a single calibration's errors."""
+        return np.hypot(self.noise_sigmas, self.fixed_sigmas)
+
+    @property
+    def rms_fixed_sigma(self) -> float:
+        """Root mean square of the fixed standard deviations."""
+        return float(np.sqrt(np.mean(self.fixed_sigmas**2)))
+
+    @property
+    def rms_noise_sigma(self) -> float:
+        """Root mean square of the standard deviations of the noise."""
+        return float(np.sqrt(np.mean(self.noise_sigmas**2)))
 
     @property
     def rms_error(self) -> float:
@@ -42,7 +65,7 @@ class ParameterGroup:
 
     @property
     def rms_sigma(self) -> float:
-        """Root mean square of the standard deviations."""
+        """Root mean square of the standard deviations of both parts together."""
         return float(np.sqrt(np.mean(self.sigmas**2)))
 
     @property

@@ -18,7 +18,7 @@ from cdpr_drake.model.calibration.cameras import (
 )
 from cdpr_drake.model.calibration.motions import UncertainPose
 from cdpr_drake.model.calibration.setup import CalibrationSetup
-from cdpr_drake.model.calibration.tracker import LaserTracker, at, locate, register
+from cdpr_drake.model.calibration.tracker import LaserTracker, LocatedPoints, at, locate, register
 from cdpr_drake.model.calibration.transforms import (
     CalibratedTransforms,
     PlatformViews,
@@ -147,17 +147,17 @@ class Site:
         sizes = [(c.width, c.height) for c in (pair.left, pair.right)]
         return calibrate_pair(held.board, left, right, sizes, setup.corner_noise, tracked)
 
-    def measure_points(self) -> tuple[UncertainPose, Array, Array, Array, Array]:
-        """Return X_WS, A_i and their standard deviations, and B_i and theirs."""
+    def measure_points(self) -> tuple[UncertainPose, LocatedPoints, LocatedPoints]:
+        """Return X_WS, the A_i and the B_i."""
         robot, setup = self._robot, self._setup
         references = corners(robot.drawing_points, floor=0.0)
         X_SW = register(references, self.tracker(references), setup.tracker_noise)
-        A, sigma_A = self._locate(X_SW, RigidTransform(), robot.drawing_points, setup.drawing_point)
+        A = self._locate(X_SW, RigidTransform(), robot.drawing_points, setup.drawing_point)
         X_WP = platform_poses(robot, 1, 0.0)[0]  # where the platform stands to be measured
         nests = corners(robot.attachment_points)
         X_SP = register(nests, self.tracker(at(X_WP, nests)), setup.tracker_noise)
-        B, sigma_B = self._locate(X_SP, X_WP, robot.attachment_points, setup.attachment_point)
-        return X_SW.inverse(), A, sigma_A, B, sigma_B
+        B = self._locate(X_SP, X_WP, robot.attachment_points, setup.attachment_point)
+        return X_SW.inverse(), A, B
 
     def see_platform(
         self, cameras: Sequence[CalibratedCamera], poses: Sequence[RigidTransform]
@@ -193,8 +193,8 @@ class Site:
 
     def _locate(
         self, frame: UncertainPose, X: RigidTransform, points: Array, bend: float
-    ) -> tuple[Array, Array]:
-        """Return points in a frame from clouds around them, and their standard deviations.
+    ) -> LocatedPoints:
+        """Return points in a frame from clouds around them.
 
         Args:
             frame: as registered, in S.
@@ -207,4 +207,4 @@ class Site:
         around = setup.scale * setup.cloud_noise * draw((setup.cloud, *points.shape))
         measured = self.tracker(at(X, middles + around)).mean(axis=0)
         touch = (setup.cloud_noise**2 + setup.tracker_noise**2) / setup.cloud
-        return locate(frame, measured, touch + bend**2)
+        return locate(frame, measured, touch, bend**2)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
@@ -75,18 +77,45 @@ def register(known: Array, measured: Array, sigma: float) -> UncertainPose:
     return UncertainPose(X=X, covariance=covariance)
 
 
-def locate(frame: UncertainPose, points: Array, variance: float) -> tuple[Array, Array]:
-    """Return points (n, 3) [m] in a frame, and their standard deviations (n, 3).
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LocatedPoints:
+    """Points in a frame, and how well they are known.
+
+    Attributes:
+        points: (n, 3) [m].
+        noise_sigmas: (n, 3) [m], standard deviations of what measuring again averages out: of the
+            frame, which is common to all points, and of touching them.
+        fixed_sigmas: (n, 3) [m], of what no measuring again would take away.
+    """
+
+    points: Array
+    noise_sigmas: Array
+    fixed_sigmas: Array
+
+    @property
+    def sigmas(self) -> Array:
+        """Standard deviations of both together (n, 3) [m]."""
+        return np.hypot(self.noise_sigmas, self.fixed_sigmas)
+
+
+def locate(frame: UncertainPose, points: Array, noise: float, fixed: float) -> LocatedPoints:
+    """Return points in a frame.
 
     Args:
         frame: pose of the frame in S, as registered.
         points: (n, 3) [m], measured in S.
-        variance: of each coordinate of them [m2].
+        noise: variance of each coordinate of them that measuring again averages out [m2].
+        fixed: variance of each coordinate that it does not [m2].
     """
     X = frame.inverse()
     R = X.X.rotation().matrix()
     sigmas = []
     for p in points:
         J = np.hstack([-skew(R @ p), np.eye(3)])
-        sigmas.append(np.sqrt(np.diag(J @ X.covariance @ J.T) + variance))
-    return at(X.X, points), np.array(sigmas)
+        sigmas.append(np.sqrt(np.diag(J @ X.covariance @ J.T) + noise))
+    shape = (len(points), 3)
+    return LocatedPoints(
+        points=at(X.X, points),
+        noise_sigmas=np.reshape(sigmas, shape),
+        fixed_sigmas=np.full(shape, np.sqrt(fixed)),
+    )

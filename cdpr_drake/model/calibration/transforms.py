@@ -12,12 +12,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import CalibrationError
 from cdpr_drake.model.calibration.cameras import MOTION, turned_by
 from cdpr_drake.model.calibration.hand_eye import robot_world_hand_eye
-from cdpr_drake.model.calibration.least_squares import Block, minimise
+from cdpr_drake.model.calibration.least_squares import Block, minimise, normal_equations
 from cdpr_drake.model.calibration.motions import (
     UncertainPose,
     between,
@@ -65,12 +66,16 @@ class PlatformViews:
 class CalibratedTransforms:
     """Cameras and target frame as the poses of the platform show them.
 
+    The covariances of poses have a fixed part too, as those of the intrinsics have.
+
     Attributes:
         X_SF: pose of the fixed camera frame F in the tracker's frame S.
         X_PM: pose of the target frame.
         X_FC: pose of each pose camera in F; that of the first defines F, and is exact.
         intrinsics: of each pose camera.
         covariances: (9, 9) of each of them.
+        fixed_covariances: (9, 9) of each, the part that the fixed bias of the patterns' points
+            causes: it stays when the same platform is measured again.
         cost: sum of squares of the errors, in standard deviations.
         freedom: what the cost should be, on average.
     """
@@ -80,6 +85,7 @@ class CalibratedTransforms:
     X_FC: list[UncertainPose]
     intrinsics: list[Intrinsics]
     covariances: list[Array]
+    fixed_covariances: list[Array]
     cost: float
     freedom: int
 
@@ -110,7 +116,8 @@ def calibrate_transforms(
     _check_turns(X_SP)
     bundle = _Bundle(robot, views, priors)
     fit = minimise(bundle.start(X_SP), bundle.blocks, bundle.move, bundle.names, bundle.shared)
-    return bundle.result(fit.state, fit.covariance, fit.cost, fit.freedom)
+    fixed = bundle.fixed_covariance(fit.state)
+    return bundle.result(fit.state, fit.covariance, fixed, fit.cost, fit.freedom)
 
 
 def _check_turns(X_SP: Sequence[RigidTransform]) -> None:
@@ -215,8 +222,38 @@ class _Bundle:
             yield root @ (state.cameras[c] - self._known[c]), root, columns
             yield self._images(state, c)
 
+    def fixed_covariance(self, state: _State) -> Array:
+        """Return the part (s, s) of the shared parameters' covariance that biases cause.
+
+        Estimates move by N^-1 J^T (S^-1/2 b) with biases b of the points, N the normal matrix and J
+        = S^-1/2 times the pixels' derivatives, S their covariance; b is the same in all rows of a
+        point.
+        """
+        noise, bias = self._views.pixel_noise, self._views.pixel_bias
+        N = normal_equations(self.blocks(state), len(self.names))[0]
+        pushed = np.zeros_like(N)
+        for c in range(self._c):
+            white, which = self._white(state, c)
+            for point in np.unique(which):
+                own = which == point
+                pull = white[own, :, 1:].sum(axis=0)
+                pushed += bias**2 / (noise**2 + np.count_nonzero(own) * bias**2) * pull.T @ pull
+        scale = np.sqrt(np.diag(N))
+        moved_by = np.linalg.inv(N / np.outer(scale, scale)) / np.outer(scale, scale)
+        return np.asarray((moved_by @ pushed @ moved_by)[: self.shared, : self.shared])
+
     def _images(self, state: _State, c: int) -> Block:
-        """Return all that one camera sees in all poses; a bias ties one point's pixels together."""
+        """Return all that one camera sees in all poses."""
+        white, _ = self._white(state, c)
+        white = white.reshape(-1, white.shape[2])
+        used = np.flatnonzero(np.any(white[:, 1:] != 0.0, axis=0))
+        return white[:, 0], white[:, 1 + used], used
+
+    def _white(self, state: _State, c: int) -> tuple[Array, NDArray[np.intp]]:
+        """Return errors and derivatives (n, 2, 1 + p) of what a camera sees, and whose they are.
+
+        A bias ties one point's pixels together: they are freed of that, see `_whitened`.
+        """
         views, first = self._views, self.shared
         rows, derivatives, which = [], [], []
         X_SC = state.X_SC[c]
@@ -242,13 +279,11 @@ class _Bundle:
             which.append(visible)
         errors = np.concatenate(rows)[:, :, None]
         both = np.concatenate([errors, np.concatenate(derivatives)], axis=2)
-        white = _whitened(both, np.concatenate(which), views.pixel_noise, views.pixel_bias)
-        white = white.reshape(-1, white.shape[2])
-        used = np.flatnonzero(np.any(white[:, 1:] != 0.0, axis=0))
-        return white[:, 0], white[:, 1 + used], used
+        points = np.concatenate(which)
+        return _whitened(both, points, views.pixel_noise, views.pixel_bias), points
 
     def result(
-        self, state: _State, covariance: Array, cost: float, freedom: int
+        self, state: _State, covariance: Array, fixed: Array, cost: float, freedom: int
     ) -> CalibratedTransforms:
         """Return what the parameters say of the robot."""
         c = self._c
@@ -261,24 +296,31 @@ class _Bundle:
             both = np.r_[6:12, 6 + 6 * i : 12 + 6 * i]
             tied = np.eye(12)
             tied[:6, :6] = J
-            C = tied @ covariance[np.ix_(both, both)] @ tied.T
-            X_FC.append(between(X_SF, state.X_SC[i], C))
+            C, D = (tied @ all_[np.ix_(both, both)] @ tied.T for all_ in (covariance, fixed))
+            X_FC.append(between(X_SF, state.X_SC[i], C, D))
         slices = [slice(6 + 6 * c + 9 * i, 15 + 6 * c + 9 * i) for i in range(c)]
         return CalibratedTransforms(
-            X_SF=UncertainPose(X=X_SF, covariance=J @ covariance[6:12, 6:12] @ J.T),
-            X_PM=UncertainPose(X=state.X_PM, covariance=covariance[:6, :6]),
+            X_SF=UncertainPose(
+                X=X_SF,
+                covariance=J @ covariance[6:12, 6:12] @ J.T,
+                fixed_covariance=J @ fixed[6:12, 6:12] @ J.T,
+            ),
+            X_PM=UncertainPose(
+                X=state.X_PM, covariance=covariance[:6, :6], fixed_covariance=fixed[:6, :6]
+            ),
             X_FC=X_FC,
             intrinsics=[
                 as_intrinsics(k, camera.intrinsics.width, camera.intrinsics.height)
                 for k, camera in zip(state.cameras, cameras, strict=True)
             ],
             covariances=[covariance[s, s] for s in slices],
+            fixed_covariances=[fixed[s, s] for s in slices],
             cost=cost,
             freedom=freedom,
         )
 
 
-def _whitened(rows: Array, which: Array, noise: float, bias: float) -> Array:
+def _whitened(rows: Array, which: NDArray[np.intp], noise: float, bias: float) -> Array:
     """Return rows (n, 2, q) for which the covariance noise^2 + bias^2 within a point is unity.
 
     For m rows of one point its inverse root is (1 - (1 - g) mean) / noise, where `mean` takes the

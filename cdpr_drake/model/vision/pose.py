@@ -29,19 +29,32 @@ SUSPECT_ERROR = 5.0
 class PoseEstimate:
     """A measured pose.
 
+    Covariances are of a small motion [rotation vector; translation] of P in W [rad, m]. Neither
+    knows of a wrong calibration of cameras, lenses or patterns, which adds an error of its own.
+
     Attributes:
         X_WP: the pose.
-        covariance: (6, 6), of a small motion [rotation vector; translation] of P in W [rad, m].
+        noise_covariance: (6, 6), of the white noise of the pixels: new in each frame, so that the
+            mean of n frames has an n-th of it.
+        fixed_covariance: (6, 6), of the fixed bias of each point in each camera, over all biases
+            there could be: for one robot it is one and the same error, as long as the platform
+            stays where it is, and no averaging takes any of it away.
         num_targets: how many different points took part.
         num_cameras: how many cameras took part.
         pixel_error: root mean square of what is left of the pixels' errors [px].
     """
 
     X_WP: RigidTransform
-    covariance: Array
+    noise_covariance: Array
+    fixed_covariance: Array
     num_targets: int
     num_cameras: int
     pixel_error: float
+
+    @property
+    def covariance(self) -> Array:
+        """The sum of both (6, 6): of a single frame of a robot whose biases are not known."""
+        return self.noise_covariance + self.fixed_covariance
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -86,6 +99,7 @@ class PoseEstimator:
         self._X_TP = [X.inverse() for X in self._geometry.X_PT]
         self._flat = np.vstack([np.pad(p.points, ((0, 0), (0, 1))) for p in setup.patterns])
         self._X_PM = setup.X_PM
+        self._variances = setup.pixel_noise**2, setup.pixel_bias**2
         self.pixel_sigma = float(np.hypot(setup.pixel_noise, setup.pixel_bias))
 
     def __call__(
@@ -140,10 +154,13 @@ class PoseEstimator:
         )
         if steps < 0:
             return None
-        covariance: Any = self.pixel_sigma**2 * np.linalg.inv(information)
+        # Both are independent from pixel to pixel, and all pixels weigh the same.
+        per_pixel: Any = np.linalg.inv(information)
+        noise, bias = self._variances
         return PoseEstimate(
             X_WP=_transform(X),
-            covariance=covariance,
+            noise_covariance=noise * per_pixel,
+            fixed_covariance=bias * per_pixel,
             num_targets=len(set(np.concatenate([v.points for v in views]).tolist())),
             num_cameras=len({v.camera for v in views}),
             pixel_error=float(np.sqrt(cost / seen.size)),
@@ -159,10 +176,15 @@ class PoseEstimator:
         to_M, to_P = np.eye(6), np.eye(6)
         to_P[3:, :3] = skew(X_WP.rotation() @ self._X_PM.translation())
         to_M[3:, :3] = -to_P[3:, :3]
-        total = sum((to_M @ e.covariance @ to_M.T for e in poses), np.zeros((6, 6)))
+
+        def of_mean(covariances: list[Array]) -> Array:
+            total = sum((to_M @ C @ to_M.T for C in covariances), np.zeros((6, 6)))
+            return np.asarray(to_P @ total @ to_P.T / len(poses) ** 2)
+
         return PoseEstimate(
             X_WP=X_WP,
-            covariance=to_P @ total @ to_P.T / len(poses) ** 2,
+            noise_covariance=of_mean([e.noise_covariance for e in poses]),
+            fixed_covariance=of_mean([e.fixed_covariance for e in poses]),
             num_targets=len(set(np.concatenate([v.points for v in views]).tolist())),
             num_cameras=len({v.camera for v in views}),
             pixel_error=self._pixel_error(self._stacked(views), X_WP),
