@@ -97,7 +97,7 @@ def _overshoots_fade(results: Mapping[str, Result]) -> Claim:
         + ", ".join(f"{b:.1f}" for b in last),
         agrees=all(b < 0.5 * a for a, b in zip(largest, last, strict=True)),
         kind="by construction",
-        null="nothing: the loop is stable, and all its errors decay",
+        null="nothing: with the drag assumed the loop is stable, and all its errors decay",
         reason="held to less than half of the largest",
     )
 
