@@ -15,7 +15,7 @@ from types import ModuleType
 
 from cdpr_drake.model.robot import CableRobot, load_robot, robot_names, save_robot
 
-__version__ = "0.1.0"
+__version__ = "0.2.0.dev0"
 
 __all__ = ["CableRobot", "__version__", "load_robot", "robot_names", "save_robot"]
 

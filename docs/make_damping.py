@@ -22,10 +22,14 @@ from cdpr_drake.study import gain_limit, gain_limit_band, platform_modes
 
 DOCS = Path(__file__).resolve().parent
 PAGE, BEFORE = DOCS / "damping.md", DOCS / "damping_before.json"
-BEGIN, END = "<!-- begin limits -->\n", "<!-- end limits -->"
+LATENCIES = (0.0, 0.02, 0.04, 0.08, 0.12)
+"""Of the second table [s]."""
 
 TESTS = ((1, 0), (1, 1), (2, 1), (3, 0), (3, 1), (4, 0), (4, 1), (5, 1))
 """Number of the test, and 0 for its start or 1 for its goal; others share these starts."""
+
+LATE = ("Test 1, goal", "Test 4, goal", "near the middle, goal")
+"""Places in the table of latencies."""
 
 ENDS = ("start", "goal")
 
@@ -93,18 +97,34 @@ def line(place: Place, before: list[dict[str, Any]]) -> str:
     return "| " + " | ".join(cells) + " |"
 
 
+def latency_line(place: Place) -> str:
+    """Return a row of the table of latencies in Markdown."""
+    limits = (gain_limit(place.robot, place.pose, latency).gain for latency in LATENCIES)
+    cells = [place.robot_name, place.name, *(f"{limit:.3g}" for limit in limits)]
+    return "| " + " | ".join(cells) + " |"
+
+
 def main() -> None:
     """Fill the page."""
     before = json.loads(BEFORE.read_text(encoding="utf-8"))
     page = PAGE.read_text(encoding="utf-8")
-    head, rest = page.split(BEGIN)
-    table = [
+    rows = list(places())
+    limits = [
         "| robot | where | limit before [1/s] | now [1/s] | band [1/s] | at [Hz] "
         "| least damping before [%] | now [%] |",
         "|---|---|---:|---:|---:|---:|---:|---:|",
-        *(line(place, before) for place in places()),
+        *(line(place, before) for place in rows),
     ]
-    PAGE.write_text(head + BEGIN + "\n".join(table) + "\n" + END + rest.split(END)[1], "utf-8")
+    latencies = [
+        "| robot | where | " + " | ".join(f"{1e3 * t:g} ms" for t in LATENCIES) + " |",
+        "|---|---|" + "---:|" * len(LATENCIES),
+        *(latency_line(place) for place in rows if place.name in LATE),
+    ]
+    for name, table in (("limits", limits), ("latencies", latencies)):
+        begin, end = f"<!-- begin {name} -->\n", f"<!-- end {name} -->"
+        head, rest = page.split(begin)
+        page = head + begin + "\n".join(table) + "\n" + end + rest.split(end)[1]
+    PAGE.write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":

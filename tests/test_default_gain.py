@@ -61,7 +61,10 @@ def test_the_gain_is_the_customary_one_or_half_the_limit(
     assert found.decided_by == ("custom" if limit >= 2.0 * CUSTOMARY_GAIN else "limit")
     if found.decided_by == "limit":
         assert found.limit is not None and found.limit.gain == pytest.approx(limit, rel=1e-5)
-        assert found.reason() == f"half the limit of {limit:.2g} 1/s at the goal"
+        assert (
+            found.reason()
+            == f"half the limit of {limit:.2g} 1/s at the goal, with the damping assumed"
+        )
         assert found.to_dict()["gain_limit_per_s"] == pytest.approx(limit, rel=1e-5)
     else:
         assert found.reason() == ""
@@ -111,7 +114,10 @@ def test_timing_and_law_are_heeded(large: CableRobot) -> None:
     assert default_gain(large, goal, latency=0.7).decided_by == "custom"  # no prediction
     share = default_gain(large, goal, customary=0.3, share=0.6)
     assert share.limit is not None and share.gain == _rounded_down(0.6 * share.limit.gain)
-    assert share.reason("here") == f"0.6 of the limit of {share.limit.gain:.2g} 1/s here"
+    assert (
+        share.reason("here")
+        == f"0.6 of the limit of {share.limit.gain:.2g} 1/s here, with the damping assumed"
+    )
     with pytest.raises(ValueError, match="latency"):
         default_gain(large, goal, latency=-0.1)
     with pytest.raises(ValueError, match="cables in the robot believed"):
@@ -235,7 +241,8 @@ def test_a_run_tells_that_the_limit_decided(
     assert 0.45 * limit < gain <= 0.5 * limit * (1.0 + 1e-6)
     assert summary["gain_decided_by"] == "limit"
     assert summary["gain_limit_per_s"] == pytest.approx(limit, rel=1e-5)
-    assert f"lambda = {gain:g} 1/s (half the limit of {limit:.2g} 1/s at the goal)" in text
+    reason = f"half the limit of {limit:.2g} 1/s at the goal, with the damping assumed"
+    assert f"lambda = {gain:g} 1/s ({reason})" in text
 
 
 def test_a_run_tells_that_the_file_decided(

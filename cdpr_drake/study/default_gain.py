@@ -67,7 +67,8 @@ class DefaultGain:
             return "as the robot file says"
         if self.decided_by == "limit" and self.limit is not None:
             part = "half" if self.share == 0.5 else f"{self.share:g} of"
-            return f"{part} the limit of {self.limit.gain:.2g} 1/s {where}"
+            limit = f"the limit of {self.limit.gain:.2g} 1/s {where}"
+            return f"{part} {limit}, with the damping assumed"
         return ""
 
     def to_dict(self) -> dict[str, Any]:

@@ -159,7 +159,7 @@ def section(results: Mapping[str, Result]) -> Section:
         tables=(_table(results),),
         claims=(
             Claim(
-                kind=kind_by(agrees, rate),
+                kind=kind_by(rate),
                 null="any cable and gain of Table 7's ranges, its tension the same",
                 null_rate=rate,
                 parameters="linear_density, gain (fitted); mass (assumed)",

@@ -17,6 +17,7 @@ from cdpr_drake.experiments.reproduction.section import (
     Section,
 )
 from cdpr_drake.experiments.reproduction.table7 import move
+from cdpr_drake.experiments.reproduction.table7_claims import SET
 from cdpr_drake.experiments.reproduction.traces import error_panels, velocity_panel
 from cdpr_drake.model.rotations import Array
 
@@ -76,7 +77,7 @@ def _turns_away(lines: Mapping[str, Result]) -> Claim:
         kind="fitted",
         null="any one of the four models alone does",
         null_rate=1.0 / len(MODELS),
-        parameters="linear_density, platform_scale, gain, target_angle, target_signs (fitted)",
+        parameters=SET,
         reason=f"as the controller sees it, after {SWUNG:g} s; the SLSM's orientation error at the "
         "end was fitted",
     )
@@ -98,6 +99,7 @@ def _overshoots_fade(results: Mapping[str, Result]) -> Claim:
         agrees=all(b < 0.5 * a for a, b in zip(largest, last, strict=True)),
         kind="by construction",
         null="nothing: with the drag assumed the loop is stable, and all its errors decay",
+        parameters=SET,
         reason="held to less than half of the largest",
     )
 

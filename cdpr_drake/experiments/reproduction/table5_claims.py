@@ -60,7 +60,7 @@ def _final(runs: Sequence[Result], place: str, model: str, number: int) -> Claim
         printed=f"{theirs[0]} mm, {theirs[1]}°",
         ours=f"{seen[0]:.2f} mm, {seen[1]:.3f}°",
         agrees=agrees,
-        kind=kind_by(agrees, rate),
+        kind=kind_by(rate),
         null=f"{left if place == 'real' else 'what the exponential has left'}, no robot: "
         f"{mean[0]:.2f} mm, {mean[1]:.3f}°",
         null_rate=rate,
@@ -123,7 +123,7 @@ def _by_how_much(pairs: Sequence[Result], number: int) -> Claim:
         printed=f"-{theirs} s",
         ours=f"{median:.4f} s",
         agrees=agrees,
-        kind=kind_by(agrees, rate),
+        kind=kind_by(rate),
         null="two runs of one model, SCMWE, that are no pair, at any of the levels below",
         null_rate=rate,
         parameters="gain, cable (assumed)",

@@ -135,7 +135,7 @@ def _claims(results: Mapping[str, Result]) -> tuple[Claim, ...]:
             printed=", ".join(f"{m:.1f}°" for m in printed_dbeta(SIZES).mean(1)) + " on mean",
             ours=", ".join(f"{m:.1f}°" for m in growth),
             agrees=grows,
-            kind=kind_by(grows, growing["growing"]),
+            kind=kind_by(growing["growing"]),
             null=f"any set in the ranges that the cables hold up; {growing['held_up']} of them",
             null_rate=growing["growing"],
             parameters=ten,

@@ -38,7 +38,7 @@ FARTHER = 5.0
 MORE = 1.1
 """A model overshoots more than another if it strays so many times as far."""
 
-SET = "linear_density, platform_scale, gain, target_angle, target_signs (fitted)"
+SET = "linear_density, platform_scale, gain, target_angle, target_signs (fitted); drag (assumed)"
 
 SAGGING = MODELS[:3]
 

@@ -21,7 +21,7 @@ from cdpr_drake.model.calibration_errors import CalibrationErrors, misjudged
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array
 
-WITHOUT_PART = ("damping_time", "target_signs")
+WITHOUT_PART = ("damping_time", "drag", "target_signs")
 """Values that play no part in slow motion, or are no matter of size."""
 
 SOFT = 2.0

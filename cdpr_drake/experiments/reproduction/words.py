@@ -67,12 +67,18 @@ def count_of_claims(report: Mapping[str, Any]) -> str:
     claims = [claim for section in report["sections"] for claim in section["claims"]]
     counted = tested(claims)
     agree = sum(claim["agrees"] for claim in counted)
-    by_chance = sum(claim["null_rate"] for claim in counted)
+    rates = [claim["null_rate"] for claim in counted]
+    chance, spread = sum(rates), math.sqrt(sum(rate * (1.0 - rate) for rate in rates))
     kinds = [claim["kind"] for claim in claims]
+    text = (
+        f"{agree} of {len(counted)} tested claims agree; null models would meet {chance:.1f} ± "
+        f"{spread:.1f} of them"
+    )
+    if agree <= chance + 2.0 * spread:
+        text += ", so this is no evidence for the model"
     return (
-        f"{agree} of {len(counted)} tested claims agree, where null models would meet "
-        f"{by_chance:.1f} on average; {kinds.count('fitted')} follow fits or choices and "
-        f"{kinds.count('by construction')} come out as they do by construction: these are not "
+        f"{text}. {kinds.count('fitted')} more claims follow fits or choices and "
+        f"{kinds.count('by construction')} come out as they do by construction; these are not "
         "counted."
     )
 
