@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import textwrap
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from importlib.metadata import version
@@ -12,9 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from cdpr_drake import __version__
-from cdpr_drake.commands.arguments import UsageError
+from cdpr_drake.commands.command import UsageError
 from cdpr_drake.commands.files import SUMMARY, staged, to_json, write_summary
-from cdpr_drake.commands.terminal import REDRAW_PERIOD, print_wrapped, say, width_of
+from cdpr_drake.commands.terminal import REDRAW_PERIOD, print_wrapped
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,7 +46,7 @@ def counted(items: Sequence[T], what: str) -> Iterator[T]:
     )
 
 
-def leave(
+def write_answer(
     options: argparse.Namespace,
     name: str,
     summary: dict[str, Any],
@@ -89,13 +88,3 @@ def leave(
         print(line)
     print_wrapped(f"In {directory}: {', '.join(summary['files'])}", indent="    ")
     return 0
-
-
-def note(text: str) -> None:
-    """Say on stderr what takes its time: a `text` of one line."""
-    say(f"{text} ...")
-
-
-def wrapped(text: str) -> list[str]:
-    """Return the lines of a `text`, no wider than the screen."""
-    return textwrap.wrap(text, max(width_of(sys.stdout), 20), break_on_hyphens=False)

@@ -10,12 +10,12 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
+from cdpr_drake.commands.terminal import print_message
 
-from cdpr_drake.commands.terminal import say
-from cdpr_drake.diagrams import Record
+if TYPE_CHECKING:
+    from cdpr_drake.diagrams import Record
 
 SUMMARY = "summary.json"
 SUFFIXES = (".csv", ".html", ".json", ".pdf", ".png", ".svg", ".yaml")
@@ -65,7 +65,9 @@ def staged(directory: Path) -> Iterator[Path]:
         yield folder
         stale = _files_of_earlier_run(directory)
         if stale:
-            say(f"note: {directory} held an earlier run, now replaced; --output DIR keeps both")
+            print_message(
+                f"note: {directory} held an earlier run, now replaced; --output DIR keeps both"
+            )
         directory.mkdir(parents=True, exist_ok=True)
         for file in sorted(folder.iterdir()):
             os.replace(file, directory / file.name)
@@ -92,6 +94,8 @@ def write_log(path: Path, record: Record) -> None:
         path: of the file.
         record: the record.
     """
+    import numpy as np
+
     headings, values = ["time [s]"], [record.time]
     for name, columns in COLUMNS.items():
         if name not in record.signals:

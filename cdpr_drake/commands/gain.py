@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from cdpr_drake.study import DefaultGain
+if TYPE_CHECKING:
+    from cdpr_drake.study import DefaultGain
 
 
 def gain_in_words(gain: float, chosen: DefaultGain | None, where: str = "at the goal") -> str:
