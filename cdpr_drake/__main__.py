@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from cdpr_drake.commands.command import UsageError
+from cdpr_drake.commands import UsageError
 from cdpr_drake.commands.parsing import parse
 from cdpr_drake.commands.terminal import print_message, warnings_on_one_line
 

@@ -6,11 +6,10 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
+from cdpr_drake.commands import Command
 from cdpr_drake.commands import arguments as common
-from cdpr_drake.commands.answer import write_answer
-from cdpr_drake.commands.command import Command
-from cdpr_drake.commands.gain import gain_in_words, gain_values
-from cdpr_drake.commands.resolve import as_file_name, input_refused
+from cdpr_drake.commands.files import write_answer
+from cdpr_drake.commands.resolve import gain_in_words, gain_values, input_refused
 from cdpr_drake.commands.results import UNITS
 from cdpr_drake.commands.terminal import CaseProgress, Column, fitted_table, wrapped
 
@@ -54,13 +53,13 @@ def _ablate(options: Namespace) -> int:
         )
     progress.done()
 
-    def figures() -> dict[str, Any]:
-        from cdpr_drake.show import ablation_figure
-
-        return {"sensors": ablation_figure(found)}
-
-    name = f"ablate-{'-'.join(as_file_name(ablation.robot) for ablation in found)}"
-    return write_answer(options, name, _summary(options, found), list(_lines(found)), figures)
+    return write_answer(
+        options,
+        f"ablate-{'-'.join(ablation.robot for ablation in found)}",
+        _summary(options, found),
+        list(_lines(found)),
+        lambda show: {"sensors": show.ablation_figure(found)},
+    )
 
 
 COMMAND = Command(

@@ -116,60 +116,30 @@ def _numbers(text: str) -> Sequence[float]:
     return values if all(map(math.isfinite, values)) else []
 
 
+def _taking(metavar: str, help: str | None = None, **settings: Any) -> dict[str, Any]:
+    return {"metavar": metavar, **({"help": help} if help else {}), **settings}
+
+
+DEFAULT_RULE = "minimum norm"
 MODELS = "ECM, CMWE, SCMWE, SLSM"
 
-ROBOT: dict[str, Any] = {
-    "metavar": "NAME|FILE",
-    "help": "a built-in robot, or a robot file (default: cogiro)",
-}
-ROBOTS: dict[str, Any] = {"metavar": "NAME|FILE,...", "type": parse_names, "action": "extend"}
-PAYLOAD: dict[str, Any] = {
-    "metavar": "KG",
-    "type": float,
-    "help": "mass carried (default: the test's; else the robot's)",
-}
-POSE: dict[str, Any] = {"metavar": "X,Y,Z[,R,P,Y]", "type": parse_pose}
-TENSIONS: dict[str, Any] = {
-    "metavar": "RULE",
-    "type": parse_rule,
-    "help": "of those that balance the platform: minimum-norm, or within-limits of the robot "
-    "(default: minimum-norm)",
-}
-CABLE_MODEL: dict[str, Any] = {
-    "metavar": "MODEL",
-    "type": parse_model,
-    "default": "SCMWE",
-    "help": f"of the law: {MODELS} (default: SCMWE)",
-}
-CABLE_MODELS: dict[str, Any] = {"metavar": "MODEL,...", "type": parse_models, "action": "extend"}
-GAIN: dict[str, Any] = {
-    "metavar": "PER_S",
-    "type": float,
-    "help": "lambda [1/s] (default: the robot file's; else 0.1, or half the limit at the pose if "
-    "that is less)",
-}
-SAMPLE_TIME: dict[str, Any] = {
-    "metavar": "S",
-    "type": float,
-    "help": "of the vision loop (default: the robot's)",
-}
-LATENCY: dict[str, Any] = {
-    "metavar": "S",
-    "type": float,
-    "help": "from image to motors (default: the robot's)",
-}
-SPAN: dict[str, Any] = {"metavar": "FROM,TO,N", "type": parse_span}
-SEED: dict[str, Any] = {
-    "metavar": "N",
-    "type": int,
-    "default": 0,
-    "help": "of all that is drawn at random (default: 0)",
-}
-JOBS: dict[str, Any] = {
-    "metavar": "N",
-    "type": parse_count,
-    "help": "processes (default: as many as cores)",
-}
+ROBOT = _taking("NAME|FILE", "a built-in robot, or a robot file (default: cogiro)")
+ROBOTS = _taking("NAME|FILE,...", type=parse_names, action="extend")
+PAYLOAD = _taking("KG", "mass carried (default: the test's; else the robot's)", type=float)
+POSE = _taking("X,Y,Z[,R,P,Y]", type=parse_pose)
+TENSIONS = _taking("RULE", "of those that balance the platform: minimum-norm, or within-limits of "
+                   "the robot (default: minimum-norm)",
+                   type=parse_rule, default=DEFAULT_RULE)  # fmt: skip
+CABLE_MODEL = _taking("MODEL", f"of the law: {MODELS} (default: SCMWE)",
+                      type=parse_model, default="SCMWE")  # fmt: skip
+CABLE_MODELS = _taking("MODEL,...", type=parse_models, action="extend")
+GAIN = _taking("PER_S", "lambda [1/s] (default: the robot file's; else 0.1, or half the limit at "
+               "the pose if that is less)", type=float)  # fmt: skip
+SAMPLE_TIME = _taking("S", "of the vision loop (default: the robot's)", type=float)
+LATENCY = _taking("S", "from image to motors (default: the robot's)", type=float)
+SPAN = _taking("FROM,TO,N", type=parse_span)
+SEED = _taking("N", "of all that is drawn at random (default: 0)", type=int, default=0)
+JOBS = _taking("N", "processes (default: as many as cores)", type=parse_count)
 NO_NOISE: dict[str, Any] = {"action": "store_true", "help": "perfect cameras and load cells"}
 
 
@@ -178,13 +148,14 @@ def add_place(
     robot: dict[str, Any] = ROBOT,
     default: str = "for CoGiRo Test 4's, else part of the way to cable 1's drawing point",
 ) -> Any:
-    """Add what `resolve_place` heeds but --tensions, and return the group that has it.
+    """Add what `resolve_place` heeds and return its group; --tensions can be added to that.
 
     Args:
         parser: the parser.
         robot: settings of --robot.
         default: the pose if nobody asks for one, in words.
     """
+    parser.set_defaults(tensions=DEFAULT_RULE)
     group = parser.add_argument_group("which robot, and where")
     group.add_argument("--robot", **robot)
     group.add_argument("--payload", **PAYLOAD)

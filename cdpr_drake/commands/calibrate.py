@@ -6,16 +6,19 @@ import math
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING, Any
 
+from cdpr_drake.commands import Command, UsageError
 from cdpr_drake.commands import arguments as common
-from cdpr_drake.commands.answer import counted, write_answer
-from cdpr_drake.commands.command import Command, UsageError
-from cdpr_drake.commands.resolve import as_file_name, input_refused, resolve_robot
-from cdpr_drake.commands.terminal import Column, fitted_table, wrapped
+from cdpr_drake.commands.files import as_file_name, write_answer
+from cdpr_drake.commands.resolve import input_refused, resolve_robot
+from cdpr_drake.commands.terminal import Column, counted, fitted_table, wrapped
 
 if TYPE_CHECKING:
     import numpy as np
 
     from cdpr_drake.model.calibration import Calibration
+
+SIZES = ("unit", "rms_error", "rms_sigma", "rms_noise_sigma", "rms_fixed_sigma")
+ERRORS = ("errors", "sigmas", "noise_sigmas", "fixed_sigmas")
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
@@ -41,18 +44,15 @@ def _calibrate(options: Namespace) -> int:
         setup = CalibrationSetup(scale=0.0 if options.no_noise else options.noise)
         found = calibrate(robot, setup, options.seed, counted=counted)
         pose_errors = found.pose_errors()
-    tables = [fitted_table(_columns(found)), ""]
-    lines = [*tables, *wrapped(_meaning(found)), "", *wrapped(_at_platform(pose_errors))]
-
-    def figures() -> dict[str, Any]:
-        from cdpr_drake.show import calibration_figure
-
-        return {"calibration": calibration_figure(found)}
-
-    name = as_file_name(robot.name)
-    texts = {f"{name}-calibrated.yaml": found.robot.to_yaml()}
-    summary = _summary(found, pose_errors)
-    return write_answer(options, f"calibrate-{name}", summary, lines, figures, texts)
+    meaning = [*wrapped(_meaning(found)), "", *wrapped(_at_platform(pose_errors))]
+    return write_answer(
+        options,
+        f"calibrate-{robot.name}",
+        _summary(found, pose_errors),
+        [fitted_table(_columns(found)), "", *meaning],
+        lambda show: {"calibration": show.calibration_figure(found)},
+        {f"{as_file_name(robot.name)}-calibrated.yaml": found.robot.to_yaml()},
+    )
 
 
 COMMAND = Command(
@@ -101,10 +101,8 @@ def _meaning(found: Calibration) -> str:
 
 
 def _at_platform(errors: np.ndarray) -> str:
-    import numpy as np
-
     turn, way = _rms(errors)
-    largest = 1e3 * np.linalg.norm(errors[:, 3:], axis=1).max()
+    largest = 1e3 * math.sqrt((errors[:, 3:] ** 2).sum(axis=1).max())
     return (
         f"At the platform: with this calibration exact images give its pose in W wrong by "
         f"{_digits(1e3 * way)} mm and {_digits(math.degrees(turn))} deg, root mean square over the "
@@ -127,16 +125,9 @@ def _summary(found: Calibration, errors: np.ndarray) -> dict[str, Any]:
         "seed": found.seed,
         "groups": {
             g.name: {
-                "unit": g.unit,
-                "rms_error": g.rms_error,
-                "rms_sigma": g.rms_sigma,
-                "rms_noise_sigma": g.rms_noise_sigma,
-                "rms_fixed_sigma": g.rms_fixed_sigma,
+                **{name: getattr(g, name) for name in SIZES},
                 "labels": list(g.labels),
-                "errors": g.errors.tolist(),
-                "sigmas": g.sigmas.tolist(),
-                "noise_sigmas": g.noise_sigmas.tolist(),
-                "fixed_sigmas": g.fixed_sigmas.tolist(),
+                **{name: getattr(g, name).tolist() for name in ERRORS},
             }
             for g in found.groups
         },

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING, Any
 
+from cdpr_drake.commands import Command
 from cdpr_drake.commands import arguments as common
-from cdpr_drake.commands.answer import counted, write_answer
-from cdpr_drake.commands.command import Command
-from cdpr_drake.commands.gain import gain_in_words, gain_values
-from cdpr_drake.commands.resolve import as_file_name, input_refused, pose_values, resolve_place
-from cdpr_drake.commands.terminal import Column, fitting, table, width_of, wrapped
+from cdpr_drake.commands.files import write_answer
+from cdpr_drake.commands.resolve import (
+    gain_in_words,
+    gain_values,
+    input_refused,
+    pose_values,
+    resolve_place,
+)
+from cdpr_drake.commands.terminal import Column, counted, fitting, table, width_of, wrapped
 
 if TYPE_CHECKING:
     from cdpr_drake.study import Comparison, DefaultGain, ModelComparison
@@ -35,7 +41,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
 def _compare_models(options: Namespace) -> int:
     with input_refused():
         comparison = _compare(options)
-        chosen = _lowest_gain(comparison) if options.gain is None else None
+        chosen = _lowest_gain(options, comparison) if options.gain is None else None
     gain = options.gain if chosen is None else chosen.gain
     summary = {**gain_values(gain, chosen), "rows": [_row(row) for row in comparison.rows]}
     columns = fitting(_columns(comparison), width_of(sys.stdout))
@@ -44,15 +50,14 @@ def _compare_models(options: Namespace) -> int:
     if chosen is not None and chosen.reason():
         text = gain_in_words(gain, chosen, "at one of these poses")
         lines += wrapped(f"In the figure {text}.")
-
-    def figures() -> dict[str, Any]:
-        from cdpr_drake.show import rates_and_responses_figure
-
-        return {"rates_and_responses": rates_and_responses_figure(comparison, gain)}
-
     names = "-".join(dict.fromkeys(row.robot for row in comparison.rows))
-    name = as_file_name(names) if options.robot else "sizes"
-    return write_answer(options, f"coupling-{name}", summary, lines, figures)
+    return write_answer(
+        options,
+        f"coupling-{names if options.robot else 'sizes'}",
+        summary,
+        lines,
+        lambda show: {"rates_and_responses": show.rates_and_responses_figure(comparison, gain)},
+    )
 
 
 COMMAND = Command(
@@ -84,17 +89,17 @@ def _compare(options: Namespace) -> Comparison:
     return Comparison(rows=tuple(rows))
 
 
-def _lowest_gain(comparison: Comparison) -> DefaultGain:
+def _lowest_gain(options: Namespace, comparison: Comparison) -> DefaultGain:
     """Return the gain that is good for all rows: they are drawn at one."""
 
     from cdpr_drake.study import default_gain, lowest_gain
 
-    def found(row: ModelComparison) -> DefaultGain:
+    found, rule = [], options.tensions
+    for row in comparison.rows:
         robot = row.gamma.rest.robot
         timing = robot.cameras.sample_time, robot.cameras.latency
-        return default_gain(robot, row.gamma.pose, row.cable_model, *timing)
-
-    return lowest_gain(found(row) for row in comparison.rows)
+        found.append(default_gain(robot, row.gamma.pose, row.cable_model, *timing, tensions=rule))
+    return lowest_gain(found)
 
 
 def _row(row: ModelComparison) -> dict[str, Any]:
@@ -117,44 +122,29 @@ def _row(row: ModelComparison) -> dict[str, Any]:
 
 def _aside(row: ModelComparison) -> float:
     """Return the largest motion across an axis of M per motion asked for along it [mm/m]."""
-    import numpy as np
-
     across = row.gamma.coupling[3:, 3:]
-    return float(1e3 * np.linalg.norm(across, axis=0).max())
+    return 1e3 * math.sqrt((across**2).sum(axis=0).max())
 
 
 def _columns(comparison: Comparison) -> list[Column]:
     rows = comparison.rows
+    # fmt: off
     return [
         Column(("robot", ""), [r.robot for r in rows], to_the_left=True),
         Column(("size", "m"), [f"{r.size:.0f}" for r in rows], rank=3),
         Column(("model", ""), [r.cable_model for r in rows], to_the_left=True),
-        Column(
-            ("slowest", "/ lambda"),
-            [f"{r.slowest:.4f}" for r in rows],
-            meaning="Slowest, fastest: rates of convergence over lambda, the eigenvalues of "
-            "Gamma; 1 for an exact model, unstable below 0.",
-        ),
-        Column(
-            ("fastest", "/ lambda"), [f"{r.gamma.eigenvalues.real.max():.4f}" for r in rows], rank=2
-        ),
-        Column(
-            ("aside", "mm/m"),
-            [f"{_aside(r):.2f}" for r in rows],
-            rank=1,
-            meaning="Aside: motion across per motion asked for, off Gamma's diagonal.",
-        ),
-        Column(
-            ("strays", "mm"),
-            [f"{r.excursion_mm:.2f}" for r in rows],
-            meaning="Strays: farthest from the straight way, of moves by a tenth of the robot's "
-            "size.",
-        ),
+        Column(("slowest", "/ lambda"), [f"{r.slowest:.4f}" for r in rows],
+               meaning="Slowest, fastest: rates of convergence over lambda, the eigenvalues of "
+               "Gamma; 1 for an exact model, unstable below 0."),
+        Column(("fastest", "/ lambda"),
+               [f"{r.gamma.eigenvalues.real.max():.4f}" for r in rows], rank=2),
+        Column(("aside", "mm/m"), [f"{_aside(r):.2f}" for r in rows], rank=1,
+               meaning="Aside: motion across per motion asked for, off Gamma's diagonal."),
+        Column(("strays", "mm"), [f"{r.excursion_mm:.2f}" for r in rows],
+               meaning="Strays: farthest from the straight way, of moves by a tenth of the robot's "
+               "size."),
         Column(("", "deg"), [f"{r.excursion_deg:.3f}" for r in rows], rank=4),
-        Column(
-            ("sag", "deg"),
-            [f"{r.dbeta_deg:.1f}" for r in rows],
-            rank=5,
-            meaning="Sag: largest angle from chord to cable at the platform.",
-        ),
+        Column(("sag", "deg"), [f"{r.dbeta_deg:.1f}" for r in rows], rank=5,
+               meaning="Sag: largest angle from chord to cable at the platform."),
     ]
+    # fmt: on

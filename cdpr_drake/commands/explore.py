@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from argparse import ArgumentParser, Namespace
 
+from cdpr_drake.commands import Command, UsageError
 from cdpr_drake.commands import arguments as common
-from cdpr_drake.commands.command import Command, UsageError
-from cdpr_drake.commands.gain import gain_in_words
-from cdpr_drake.commands.resolve import input_refused, resolve_gain, resolve_place
+from cdpr_drake.commands.resolve import gain_in_words, input_refused, resolve_gain, resolve_place
 from cdpr_drake.commands.terminal import print_wrapped
 
 PORTS = (1024, 65534)

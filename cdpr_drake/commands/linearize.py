@@ -5,13 +5,13 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING, Any
 
+from cdpr_drake.commands import Command, UsageError
 from cdpr_drake.commands import arguments as common
-from cdpr_drake.commands.answer import write_answer
-from cdpr_drake.commands.command import Command, UsageError
-from cdpr_drake.commands.gain import gain_in_words, gain_values
+from cdpr_drake.commands.files import write_answer
 from cdpr_drake.commands.resolve import (
     Place,
-    as_file_name,
+    gain_in_words,
+    gain_values,
     input_refused,
     resolve_gain,
     resolve_place,
@@ -35,6 +35,8 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _linearize(options: Namespace) -> int:
+    from cdpr_drake.study.modes import named
+
     if options.continuous and (options.sample_time is not None or options.latency is not None):
         raise UsageError("--continuous: then there is neither --sample-time nor --latency")
     with input_refused():
@@ -52,20 +54,20 @@ def _linearize(options: Namespace) -> int:
         **gain_values(gain, chosen),
         "sample_time_s": sampling,
         "latency_s": None if options.continuous else latency,
-        **_summary(found),
+        "is_stable": not found.unstable,
+        "neutral": _neutral(found),
+        "deadbeat": found.deadbeat,
+        "modes": named(found),
     }
 
-    def figures() -> dict[str, Any]:
-        from cdpr_drake.show import mode_shape_figure, pole_figure
-
-        drawn = {"poles": pole_figure({timing: found}, head)}
+    def figures(show: Any) -> dict[str, Any]:
+        drawn = {"poles": show.pole_figure({timing: found}, head)}
         if (swing := least_damped(found)) is not None:
-            drawn["mode_shape"] = mode_shape_figure(found, swing, place.robot, place.pose)
+            drawn["mode_shape"] = show.mode_shape_figure(found, swing, place.robot, place.pose)
         return drawn
 
     lines = [*wrapped(head), "", str(found), "", *wrapped(_verdict(found))]
-    name = f"linearize-{as_file_name(place.robot.name)}"
-    return write_answer(options, name, summary, lines, figures)
+    return write_answer(options, f"linearize-{place.robot.name}", summary, lines, figures)
 
 
 COMMAND = Command(
@@ -97,17 +99,6 @@ def _find_modes(
     if sample_time is None:
         return modes(linearize(loop, at_rest, ["desired_pose"], ["pose_error"]))
     return modes(one_period_map(loop, at_rest))
-
-
-def _summary(found: Modes) -> dict[str, Any]:
-    from cdpr_drake.study.modes import named
-
-    return {
-        "is_stable": not found.unstable,
-        "neutral": _neutral(found),
-        "deadbeat": found.deadbeat,
-        "modes": named(found),
-    }
 
 
 def least_damped(found: Modes) -> Mode | None:

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import argparse
 import re
-import sys
-import textwrap
 from collections.abc import Sequence
 from typing import NamedTuple, NoReturn
 
 from cdpr_drake import __version__
-from cdpr_drake.commands.command import EXIT_STATUS, Command, UsageError
+from cdpr_drake.commands import EXIT_STATUS, Command, UsageError
 from cdpr_drake.commands.registry import added_commands, built_in_commands, find_command
-from cdpr_drake.commands.terminal import PROGRAM, print_message, width_of
+from cdpr_drake.commands.terminal import PROGRAM, paragraph, print_message
 
 
 class Call(NamedTuple):
@@ -47,11 +45,8 @@ def parse(argv: Sequence[str]) -> Call:
     name, *rest = argv or ["--help"]
     if name.startswith("-"):
         _program_parser(with_list=name in ("-h", "--help")).parse_args(argv or ["--help"])
-        raise UsageError(f"no command before {' '.join(rest)} (try {PROGRAM} --help)")
-    try:
-        command = find_command(name)
-    except UsageError as error:
-        raise UsageError(f"{error} (try {PROGRAM} --help)") from error
+        raise UsageError(f"no command (try {PROGRAM} --help)")
+    command = find_command(name)
     parser = _parser(
         f"{PROGRAM} {name}",
         command.description,
@@ -69,7 +64,7 @@ def _program_parser(with_list: bool) -> _Parser:
         "Vision-based control of cable-driven parallel robots with sagging cables.",
         [
             *([_list_of_commands()] if with_list else []),
-            _filled(f"{PROGRAM} COMMAND --help tells a command's arguments, with an example."),
+            paragraph(f"{PROGRAM} COMMAND --help tells a command's arguments, with an example."),
         ],
         EXIT_STATUS,
     )
@@ -82,8 +77,8 @@ def _parser(program: str, description: str, paragraphs: list[str], exit_status: 
     """Return a parser whose help ends with some paragraphs, their lines broken as they are."""
     return _Parser(
         prog=program,
-        description=_filled(description),
-        epilog="\n\n".join((*paragraphs, _filled(f"Exit status: {exit_status}"))),
+        description=paragraph(description),
+        epilog="\n\n".join((*paragraphs, paragraph(f"Exit status: {exit_status}"))),
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
@@ -101,16 +96,10 @@ def _list_of_commands() -> str:
     width = max(map(len, (*summaries, *added)))
 
     def lines(rows: dict[str, str]) -> str:
-        return "\n".join(_filled(f"  {n:{width}}  {rows[n]}", " " * (width + 4)) for n in rows)
+        return "\n".join(paragraph(f"  {n:{width}}  {rows[n]}", " " * (width + 4)) for n in rows)
 
     listed = f"commands:\n{lines(summaries)}"
     return f"{listed}\n\ncommands of other packages:\n{lines(added)}" if added else listed
-
-
-def _filled(text: str, indent: str = "") -> str:
-    """Return a paragraph no wider than argparse makes its own."""
-    width = max(width_of(sys.stdout) - 2, 20)
-    return textwrap.fill(text, width, subsequent_indent=indent, break_on_hyphens=False)
 
 
 def _attach_negative_values(argv: Sequence[str]) -> list[str]:

@@ -11,7 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from importlib.metadata import EntryPoint, entry_points
 
-from cdpr_drake.commands.command import Command, UsageError
+from cdpr_drake.commands import Command, UsageError
+from cdpr_drake.commands.terminal import PROGRAM
 
 GROUP = "cdpr_drake.commands"
 """Group of the entry points, and where the commands of this package are."""
@@ -44,8 +45,9 @@ def find_command(name: str) -> Command:
         return _built_in(name)
     others = _added()
     if name not in others:
+        message = f"argument COMMAND: invalid choice: {name!r}"
         known = ", ".join((*BUILT_IN, *others))
-        raise UsageError(f"argument COMMAND: invalid choice: {name!r}; commands are {known}")
+        raise UsageError(f"{message}; commands are {known} (try {PROGRAM} --help)")
     return _load(others[name])
 
 
@@ -57,14 +59,10 @@ def built_in_commands() -> dict[str, Command]:
 def added_commands() -> Iterator[tuple[str, str, Command | UsageError]]:
     """Yield name, package and command of what other packages add, or why one cannot be used."""
     for name, entries in _added().items():
-        for package in map(_package, entries):
-            if name in BUILT_IN:
-                yield name, package, UsageError(f"{name} of {package}: the name is taken")
-        if name not in BUILT_IN:
-            try:
-                yield name, _package(entries[0]), _load(entries)
-            except UsageError as error:
-                yield name, _package(entries[0]), error
+        try:
+            yield name, _package(entries[0]), _load(entries)
+        except UsageError as error:
+            yield name, _package(entries[0]), error
 
 
 def _built_in(name: str) -> Command:
@@ -86,15 +84,15 @@ def _package(entry: EntryPoint) -> str:
 
 def _load(entries: list[EntryPoint]) -> Command:
     """Return the command of a name's entry points, which have to be one."""
-    entry = entries[0]
-    if len(entries) > 1:
-        raise UsageError(f"{entry.name}: added by each of {', '.join(map(_package, entries))}")
+    entry, packages = entries[0], ", ".join(map(_package, entries))
+    what = f"command {entry.name} of {packages}"
+    if len(entries) > 1 or entry.name in BUILT_IN:
+        raise UsageError(f"{what}: there is another of this name")
     try:
         command = entry.load()
-    except Exception as error:  # whatever a file may raise while it is imported
+    except (Exception, SystemExit) as error:  # whatever a file may raise while it is imported
         reason = f"{type(error).__name__}: {error}"
-        where = f"{entry.name} of {_package(entry)}"
-        raise UsageError(f"{where}: {entry.value} cannot be imported ({reason})") from error
+        raise UsageError(f"{what}: {entry.value} cannot be imported ({reason})") from error
     if not isinstance(command, Command):
-        raise UsageError(f"{entry.name} of {_package(entry)}: {entry.value} is no Command")
+        raise UsageError(f"{what}: {entry.value} is no Command")
     return command

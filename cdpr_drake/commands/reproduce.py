@@ -9,9 +9,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cdpr_drake.commands.answer import DOTS_PER_INCH
-from cdpr_drake.commands.command import Command, UsageError
-from cdpr_drake.commands.files import staged, to_json
+from cdpr_drake.commands import Command, UsageError
+from cdpr_drake.commands.files import DOTS_PER_INCH, staged, to_json
 from cdpr_drake.commands.terminal import CaseProgress, print_message, print_wrapped
 
 if TYPE_CHECKING:

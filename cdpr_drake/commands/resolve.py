@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import re
+import math
 from argparse import Namespace
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from cdpr_drake.commands.command import UsageError
+from cdpr_drake.commands import UsageError
+from cdpr_drake.commands.arguments import DEFAULT_RULE
 from cdpr_drake.commands.kernels import compilation_announced
 
 if TYPE_CHECKING:
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from cdpr_drake.study import DefaultGain
 
 DEFAULT_TEST = 4
-DEFAULT_RULE = "minimum norm"
 
 
 class Place(NamedTuple):
@@ -80,13 +80,9 @@ def resolve_place(
     """Return where a question is asked: at a pose, a test's goal, or a comparable pose of robots.
 
     Args:
-        options: with payload, test, pose and, in most commands, tensions.
+        options: with payload, test, pose and tensions.
         robot: name or file; that of the options if None.
         default_test: at whose goal CoGiRo is without test and pose, if at any.
-
-    Raises:
-        RobotFileError: the robot cannot be read, or cannot carry the payload.
-        ValueError: the options do not make sense.
     """
     from cdpr_drake.model.rotations import as_pose
     from cdpr_drake.study import comparable_pose
@@ -98,7 +94,7 @@ def resolve_place(
         pose, where = test.poses(found)[1], f"at the goal of Test {number}"
     if options.pose is not None:
         pose, where = as_pose(options.pose), "at the pose asked for"
-    return Place(found, pose, where, _rule(options))
+    return Place(found, pose, where, options.tensions)
 
 
 def resolve_move(options: Namespace) -> Move:
@@ -106,18 +102,13 @@ def resolve_move(options: Namespace) -> Move:
 
     Args:
         options: with robot, payload, test, start, goal and tensions.
-
-    Raises:
-        RobotFileError: the robot cannot be read, or cannot carry the payload.
-        ValueError: the options do not make sense.
     """
     from cdpr_drake.experiments.moves import move_near_the_middle
 
     robot, number, test = _robot_and_test(options, options.robot, DEFAULT_TEST)
     start, goal = move_near_the_middle(robot) if test is None else test.poses(robot)
-    start = start if options.start is None else options.start
-    goal = goal if options.goal is None else options.goal
-    return Move(robot, start, goal, number, test, _rule(options))
+    ends = options.start or start, options.goal or goal
+    return Move(robot, *ends, number, test, options.tensions)
 
 
 def resolve_robot(name: str | None) -> CableRobot:
@@ -138,22 +129,30 @@ def resolve_timing(options: Namespace, robot: CableRobot) -> tuple[float, float]
 def resolve_gain(
     options: Namespace, place: Place, sample_time: float | None, latency: float
 ) -> tuple[float, DefaultGain | None]:
-    """Return lambda [1/s] of a loop, and why it is that if the options do not say it.
+    """Return lambda [1/s] of a loop, and why it is that if the `options` do not say it.
 
-    Args:
-        options: with gain and cable_model.
-        place: where the loop is.
-        sample_time: its period [s]; None if it is continuous.
-        latency: from image to motors [s].
+    The loop is at a `place`, with a `sample_time`, None if continuous, and a `latency` [s].
     """
     from cdpr_drake.study import default_gain
 
     if options.gain is not None:
         return options.gain, None
-    timing = sample_time, latency
-    robot, pose, _, tensions = place
-    chosen = default_gain(robot, pose, options.cable_model, *timing, tensions=tensions)
+    where = place.robot, place.pose, options.cable_model
+    chosen = default_gain(*where, sample_time, latency, tensions=place.tensions)
     return chosen.gain, chosen
+
+
+def gain_in_words(gain: float, chosen: DefaultGain | None, where: str = "at the goal") -> str:
+    """Return a `gain` [1/s] as part of a sentence, with why it was `chosen`, a limit `where`."""
+    reason = "" if chosen is None else chosen.reason(where)
+    return f"lambda = {gain:g} 1/s" + (f" ({reason})" if reason else "")
+
+
+def gain_values(gain: float, chosen: DefaultGain | None, asked: str = "option") -> dict[str, Any]:
+    """Return a `gain` [1/s] for a summary, and why it was `chosen`, or what `asked` for it."""
+    if chosen is not None:
+        return chosen.to_dict()
+    return {"gain_per_s": gain, "gain_decided_by": asked, "gain_limit_per_s": None}
 
 
 @contextlib.contextmanager
@@ -169,33 +168,17 @@ def input_refused() -> Iterator[None]:
 
 
 def pose_values(pose: RigidTransform) -> list[float]:
-    """Return x, y, z [m], roll, pitch, yaw [deg] of a pose, for a summary.
-
-    Args:
-        pose: X_WP.
-    """
+    """Return x, y, z [m], roll, pitch, yaw [deg] of a `pose` X_WP, for a summary."""
     import numpy as np
 
     angles = np.degrees(pose.rotation().ToRollPitchYaw().vector())
     return [*pose.translation().tolist(), *angles.tolist()]
 
 
-def as_file_name(text: str, otherwise: str = "robot") -> str:
-    """Return a text as the name of a directory.
-
-    Args:
-        text: the text.
-        otherwise: the name if nothing of it is left.
-    """
-    return re.sub(r"[^\w.-]+", "-", text).strip(".-") or otherwise
-
-
 def _robot_and_test(
     options: Namespace, name: str | None, default_test: int | None
 ) -> tuple[CableRobot, int | None, PaperTest | None]:
     """Return the robot with what it carries, and the test that is meant."""
-    import math
-
     from cdpr_drake.experiments.paper_tests import paper_test, paper_tests
 
     robot = resolve_robot(name)
@@ -205,12 +188,7 @@ def _robot_and_test(
     test = None if number is None else paper_test(number)
     payload = options.payload
     if payload is None:
-        return robot if test is None else test.carried_by(robot), number, test
+        return test.carried_by(robot) if test is not None else robot, number, test
     if not (math.isfinite(payload) and payload >= 0.0):
         raise ValueError(f"the payload must be >= 0 and finite, got {payload:g} kg")
     return robot.with_payload(payload), number, test
-
-
-def _rule(options: Namespace) -> str:
-    """Return the rule for tensions; commands without the option have the default."""
-    return getattr(options, "tensions", None) or DEFAULT_RULE

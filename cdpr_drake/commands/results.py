@@ -47,18 +47,13 @@ def summarize(name: str, setup: Setup, runs: Sequence[Run]) -> dict[str, Any]:
         "sample_time_s": setup.sample_time,
         "latency_s": setup.latency,
         "calibrated": setup.calibrated is not None,
-        "noise": setup.noise,
-        "sensors": setup.sensors,
-        "estimator": setup.estimator,
-        "seed": setup.seed,
-        "runs": {r.setup.label: _outcome(r) for r in runs},
+        **{name: getattr(setup, name) for name in ("noise", "sensors", "estimator", "seed")},
+        "runs": {r.setup.label: {**_law(r.setup), **r.summary.to_dict()} for r in runs},
     }
 
 
-def _outcome(result: Run) -> dict[str, Any]:
-    setup = result.setup
-    head = {"controller": setup.controller, "cable_model": setup.cable_model}
-    return {**head, **result.summary.to_dict()}
+def _law(setup: Setup) -> dict[str, str]:
+    return {"controller": setup.controller, "cable_model": setup.cable_model}
 
 
 def print_results(runs: Sequence[Run]) -> None:
@@ -97,37 +92,22 @@ def _columns(runs: Sequence[Run]) -> list[Column]:
         values = [getattr(summary, attribute) for summary in results]
         return ["-" if value is None else f"{value:.{digits}f}" for value in values]
 
+    # fmt: off
     return [
         Column(("", "run"), [r.setup.label for r in runs], to_the_left=True),
-        Column(
-            ("final", "mm"),
-            cells("position_error", 1),
-            meaning="Final error: true pose against the goal, mean of the last second.",
-        ),
+        Column(("final", "mm"), cells("position_error", 1),
+               meaning="Final error: true pose against the goal, mean of the last second."),
         Column(("error", "deg"), cells("orientation_error", 3)),
-        Column(
-            ("seen", "mm"),
-            cells("position_error_seen", 1),
-            rank=4,
-            meaning="Seen: the same as the controller measures it.",
-        ),
+        Column(("seen", "mm"), cells("position_error_seen", 1), rank=4,
+               meaning="Seen: the same as the controller measures it."),
         Column(("", "deg"), cells("orientation_error_seen", 3), rank=5),
-        Column(
-            ("to 2 %", "s"),
-            cells("settled_after", 1),
-            meaning="To 2 %: from then on the position error is below 2 % of the first.",
-        ),
-        Column(
-            ("strays", "mm"),
-            cells("position_excursion", 1),
-            rank=1,
-            meaning="Strays: farthest from the straight way to the goal.",
-        ),
+        Column(("to 2 %", "s"), cells("settled_after", 1),
+               meaning="To 2 %: from then on the position error is below 2 % of the first."),
+        Column(("strays", "mm"), cells("position_excursion", 1), rank=1,
+               meaning="Strays: farthest from the straight way to the goal."),
         Column(("", "deg"), cells("orientation_excursion", 2), rank=3),
-        Column(
-            ("tension", "N"),
-            [f"{s.lowest_tension:.0f}-{s.highest_tension:.0f}" for s in results],
-            rank=2,
-            meaning="Tension: lowest and highest at the drawing points.",
-        ),
+        Column(("tension", "N"),
+               [f"{s.lowest_tension:.0f}-{s.highest_tension:.0f}" for s in results], rank=2,
+               meaning="Tension: lowest and highest at the drawing points."),
     ]
+    # fmt: on

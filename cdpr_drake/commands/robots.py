@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 
-from cdpr_drake.commands.command import Command
+from cdpr_drake.commands import Command
 from cdpr_drake.commands.terminal import Column, fitted_table, print_wrapped
-
-
-def _add_arguments(parser: ArgumentParser) -> None:
-    """There are none."""
 
 
 def _list_robots(options: Namespace) -> int:
@@ -40,7 +36,5 @@ def _list_robots(options: Namespace) -> int:
 COMMAND = Command(
     summary="list the built-in robots",
     description="List the built-in robots: size, mass, cables, description.",
-    example="",
-    add_arguments=_add_arguments,
     work=_list_robots,
 )

@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import math
 import re
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from cdpr_drake.commands import Command, UsageError
 from cdpr_drake.commands import arguments as common
-from cdpr_drake.commands.command import Command, UsageError
-from cdpr_drake.commands.files import SUMMARY, staged, to_json, write_log, write_summary
-from cdpr_drake.commands.gain import gain_in_words, gain_values
-from cdpr_drake.commands.resolve import Move, as_file_name, input_refused, resolve_move
+from cdpr_drake.commands.files import SUMMARY, as_file_name, staged, to_json, write_log
+from cdpr_drake.commands.resolve import (
+    Move,
+    gain_in_words,
+    gain_values,
+    input_refused,
+    resolve_move,
+)
 from cdpr_drake.commands.results import print_results, summarize
 from cdpr_drake.commands.terminal import Progress, print_message, print_wrapped
 
@@ -170,11 +176,12 @@ def plan(options: Namespace) -> Plan:
     if chosen is not None:
         setups = [_at_gain(s, chosen, options.until) for s in setups]
     is_test = move.number is not None and options.start is None and options.goal is None
-    name = f"test-{move.number}" if is_test else as_file_name(move.robot.name, "run")
-    # Runs that see or believe otherwise do not replace the plain one's results.
+    name = f"test-{move.number}" if is_test else as_file_name(move.robot.name)
+    # Runs that see, believe or pull otherwise do not replace the plain one's results.
     seen = "" if options.sensors == Setup.sensors else f"-{options.sensors}"
     believed = "" if options.calibrated is None else "-calibrated"
-    return Plan(f"{name}{seen}{believed}", setups, chosen)
+    pulled = "" if options.tensions == common.DEFAULT_RULE else f"-{as_file_name(options.tensions)}"
+    return Plan(f"{name}{seen}{believed}{pulled}", setups, chosen)
 
 
 def _values(options: Namespace, move: Move) -> dict[str, Any]:
@@ -250,13 +257,11 @@ def describe(name: str, setup: Setup, chosen: DefaultGain | None = None) -> str:
         setup: of one of the runs.
         chosen: why their gain is what it is, if nobody asked for one.
     """
-    import numpy as np
-
     from cdpr_drake.experiments.moves import DECAYS, LONGEST
     from cdpr_drake.model.servo import pose_error
 
     s = pose_error(setup.start, setup.goal, setup.robot.cameras.X_PM)
-    turn, way = np.degrees(np.linalg.norm(s[:3])), np.linalg.norm(s[3:])
+    turn, way = math.degrees(math.hypot(*s[:3])), math.hypot(*s[3:])
     test = re.match(r"test-(\d+)", name)
     what = f"Test {test[1]} of the paper" if test else "A move"
     loop = "a continuous loop"
@@ -265,6 +270,8 @@ def describe(name: str, setup: Setup, chosen: DefaultGain | None = None) -> str:
     noise = f"noise with seed {setup.seed}" if setup.noise else "no noise"
     if setup.sensors != "gaussian":
         noise = f"sensors: {setup.sensors} ({setup.estimator} estimate), {noise}"
+    if setup.tensions != common.DEFAULT_RULE:
+        noise = f"tensions {setup.tensions}, {noise}"
     if setup.calibrated is not None:
         noise = f"a calibrated robot believed, {noise}"
     gain, rest = gain_in_words(setup.gain, chosen), ""
@@ -321,4 +328,4 @@ def _write_all(
             title=label,
         )
     summary["files"] = [SUMMARY, *sorted(file.name for file in folder.iterdir())]
-    write_summary(folder / SUMMARY, summary)
+    (folder / SUMMARY).write_text(f"{to_json(summary)}\n", encoding="utf-8")

@@ -6,20 +6,14 @@ import math
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING, Any
 
+from cdpr_drake.commands import Command
 from cdpr_drake.commands import arguments as common
-from cdpr_drake.commands.answer import counted, write_answer
-from cdpr_drake.commands.command import Command
-from cdpr_drake.commands.resolve import (
-    Place,
-    as_file_name,
-    input_refused,
-    resolve_place,
-    resolve_timing,
-)
-from cdpr_drake.commands.terminal import wrapped
+from cdpr_drake.commands.files import write_answer
+from cdpr_drake.commands.resolve import Place, input_refused, resolve_place, resolve_timing
+from cdpr_drake.commands.terminal import counted, wrapped
 
 if TYPE_CHECKING:
-    from cdpr_drake.study import GainBand, GainLimit, StabilityMap
+    from cdpr_drake.study import GainLimit, StabilityMap
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
@@ -64,19 +58,23 @@ def _find_limit(options: Namespace) -> int:
         "sample_time_s": period,
         "latency_s": latency,
         **_limit(limit),
-        "band": _band(band),
+        "band": {
+            "loss_factors": list(band.loss_factors),
+            "damping_times_s": list(band.damping_times),
+            "limits": [_limit(limit) for limit in band.limits],
+        },
     }
-    lines = [*wrapped(head), "", *wrapped(_sentence(limit)), *wrapped(_band_sentence(band))]
+    text = str(limit)
+    lines = [*wrapped(head), "", *wrapped(f"{text[0].upper()}{text[1:]}.")]
+    lines += wrapped(f"The damping of the cables is not known: {band}.")
     if found is not None:
         summary["map"] = _map_values(found)
         lines += ["", *_table(found)]
 
-    def figures() -> dict[str, Any]:
-        from cdpr_drake.show import stability_figure
+    def figures(show: Any) -> dict[str, Any]:
+        return {} if found is None else {"stability": show.stability_figure(found, title=head)}
 
-        return {} if found is None else {"stability": stability_figure(found, title=head)}
-
-    return write_answer(options, f"stability-{as_file_name(robot.name)}", summary, lines, figures)
+    return write_answer(options, f"stability-{robot.name}", summary, lines, figures)
 
 
 COMMAND = Command(
@@ -132,24 +130,6 @@ def _limit(limit: GainLimit) -> dict[str, Any]:
         "unstable_gains_per_s": [list(span) for span in limit.unstable],
         "searched_up_to_per_s": limit.searched,
     }
-
-
-def _band(band: GainBand) -> dict[str, Any]:
-    """Return a band as plain values."""
-    return {
-        "loss_factors": list(band.loss_factors),
-        "damping_times_s": list(band.damping_times),
-        "limits": [_limit(limit) for limit in band.limits],
-    }
-
-
-def _band_sentence(band: GainBand) -> str:
-    return f"The damping of the cables is not known: {band}."
-
-
-def _sentence(limit: GainLimit) -> str:
-    text = str(limit)
-    return f"{text[0].upper()}{text[1:]}."
 
 
 def _table(found: StabilityMap) -> list[str]:

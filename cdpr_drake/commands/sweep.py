@@ -10,19 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cdpr_drake import __version__
+from cdpr_drake.commands import Command, UsageError
 from cdpr_drake.commands import arguments as common
-from cdpr_drake.commands.answer import write_answer
-from cdpr_drake.commands.command import Command, UsageError
-from cdpr_drake.commands.gain import gain_in_words
-from cdpr_drake.commands.resolve import as_file_name, input_refused
+from cdpr_drake.commands.files import as_file_name, write_answer
+from cdpr_drake.commands.resolve import gain_in_words, input_refused
 from cdpr_drake.commands.results import UNITS
-from cdpr_drake.commands.terminal import (
-    CaseProgress,
-    Column,
-    fitted_table,
-    print_message,
-    wrapped,
-)
+from cdpr_drake.commands.terminal import CaseProgress, Column, fitted_table, print_message, wrapped
 
 if TYPE_CHECKING:
     import numpy as np
@@ -84,7 +77,7 @@ def _sweep(options: Namespace) -> int:
         base, spread, chosen = _plan(options)
         setup, _ = draw(base, case_seed(options.seed, 0), **spread)
         prepare(setup)
-    name = f"sweep-{as_file_name(setup.robot.name)}"
+    name = as_file_name(f"sweep-{setup.robot.name}")
     options.output = options.output or Path("out") / name
     progress = CaseProgress()
     try:
@@ -103,7 +96,7 @@ def _sweep(options: Namespace) -> int:
         return 1
     progress.done()
 
-    def figures() -> dict[str, Any]:
+    def figures(show: Any) -> dict[str, Any]:
         from cdpr_drake.show.sweep_plots import sweep_figure
 
         return {"sweep": sweep_figure(found)} if len(found.errors) < len(found) else {}
@@ -159,10 +152,10 @@ def _plan(options: Namespace) -> tuple[dict[str, Any], dict[str, Any], DefaultGa
         "cable_model": options.cable_model,
         "noise": not options.no_noise,
         "sensors": options.sensors,
+        "tensions": options.tensions,
     }
-    for name in ("until", "tensions"):
-        if getattr(options, name) is not None:
-            changes[name] = getattr(options, name)
+    if options.until is not None:
+        changes["until"] = options.until
     spread: dict[str, Any] = {"calibration": options.calibration}
     for name, given, lowest in (
         ("payload", options.payload, 0.0),

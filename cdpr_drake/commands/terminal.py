@@ -10,7 +10,9 @@ import time
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import KW_ONLY, dataclass
-from typing import Any, TextIO
+from typing import Any, TextIO, TypeVar
+
+T = TypeVar("T")
 
 PROGRAM = "cdpr-drake"
 
@@ -34,22 +36,17 @@ def width_of(stream: TextIO) -> int:
 
 
 def print_wrapped(text: str, indent: str = "") -> None:
-    """Print a paragraph on stdout, no wider than the screen.
+    """Print a `text` on stdout, no wider than the screen, lines but the first after an `indent`."""
+    print(paragraph(text, indent), flush=True)
 
-    Args:
-        text: the paragraph.
-        indent: of all its lines but the first.
-    """
-    print("\n".join(wrapped(text, indent)), flush=True)
+
+def paragraph(text: str, indent: str = "") -> str:
+    """Return a `text` in lines no wider than the screen, all but the first after an `indent`."""
+    return "\n".join(wrapped(text, indent))
 
 
 def wrapped(text: str, indent: str = "") -> list[str]:
-    """Return the lines of a paragraph, no wider than the screen.
-
-    Args:
-        text: the paragraph.
-        indent: of all its lines but the first.
-    """
+    """Return the lines of `paragraph` for a `text` and an `indent`."""
     width = max(width_of(sys.stdout), 20)
     return textwrap.wrap(text, width, subsequent_indent=indent, break_on_hyphens=False)
 
@@ -95,14 +92,13 @@ class Progress:
 
     def __init__(self, label: str, until: float, label_width: int = 0) -> None:
         self._label, self._until = label.ljust(label_width), until
-        self._is_terminal = sys.stderr.isatty()
         self._drawn_at = -REDRAW_PERIOD
         self._begun = time.monotonic()
 
     def __call__(self, now: float) -> None:
         """Show that the run has come to the time `now` [s]."""
         clock = time.monotonic()
-        if not self._is_terminal or clock - self._drawn_at < REDRAW_PERIOD:
+        if not sys.stderr.isatty() or clock - self._drawn_at < REDRAW_PERIOD:
             return
         self._drawn_at = clock
         end = f"{self._until:g}"
@@ -113,22 +109,18 @@ class Progress:
     def done(self, factor: float) -> None:
         """Replace the bar by a last line, with how many times real time the run went: `factor`."""
         took = time.monotonic() - self._begun
-        line = f"{self._label}  {self._until:g} s in {took:.1f} s, {factor:.1f} x real time"
-        _draw(line)
-        print(file=sys.stderr, flush=True)
+        _draw(f"{self._label}  {self._until:g} s in {took:.1f} s, {factor:.1f} x real time", "\n")
 
     def clear(self) -> None:
         """Take the bar away."""
-        if self._is_terminal:
-            _draw("")
-            print(end="\r", file=sys.stderr, flush=True)
+        if sys.stderr.isatty():
+            _draw("", "\r")
 
 
 class CaseProgress:
     """The progress of a sweep on stderr: a bar on a terminal, one line at the end elsewhere."""
 
     def __init__(self) -> None:
-        self._is_terminal = sys.stderr.isatty()
         self._begun = time.monotonic()
         self._resumed: int | None = None
         self._counts = (0, 0)
@@ -143,20 +135,36 @@ class CaseProgress:
         self._counts = (done, total)
         if self._resumed is None:
             self._resumed = done
-        if not self._is_terminal:
-            return
-        counter = f"{done:{len(str(total))}} of {total} cases  {self._took()}"
-        _draw(f"{_bar(done / max(total, 1), len(counter) + 6)}{counter}")
+        if sys.stderr.isatty():
+            counter = f"{done:{len(str(total))}} of {total} cases  {self._took()}"
+            _draw(f"{_bar(done / max(total, 1), len(counter) + 6)}{counter}")
 
     def done(self) -> None:
         """Replace the bar by a last line."""
         done, total = self._counts
         earlier = f", {self._resumed} of them earlier" if self._resumed else ""
-        _draw(f"{done} of {total} cases{earlier}, in {self._took()}")
-        print(file=sys.stderr, flush=True)
+        _draw(f"{done} of {total} cases{earlier}, in {self._took()}", "\n")
 
     def _took(self) -> str:
         return f"{time.monotonic() - self._begun:.0f} s"
+
+
+def counted(items: Sequence[T], what: str) -> Iterator[T]:
+    """Yield items with their count on stderr: rewritten on a terminal, one line at the end else.
+
+    Args:
+        items: the items.
+        what: they are, in the plural.
+    """
+    begun, drawn = time.monotonic(), -REDRAW_PERIOD
+    for i, item in enumerate(items):
+        now = time.monotonic()
+        if sys.stderr.isatty() and now - drawn >= REDRAW_PERIOD:
+            drawn = now
+            _draw(f"{i} of {len(items)} {what}")
+        yield item
+    took = time.monotonic() - begun
+    _draw(f"{len(items)} of {len(items)} {what} in {took:.1f} s", "\n")
 
 
 def _bar(share: float, taken: int) -> str:
@@ -168,12 +176,12 @@ def _bar(share: float, taken: int) -> str:
     return f"[{'#' * done}{'.' * (room - done)}]  "
 
 
-def _draw(line: str) -> None:
+def _draw(line: str, end: str = "") -> None:
     """Write a line on stderr, on a terminal over the one before."""
     if sys.stderr.isatty():
         width = width_of(sys.stderr) - 1
         line = f"\r{line[:width]:<{width}}"
-    print(line, end="", file=sys.stderr, flush=True)
+    print(line, end=end, file=sys.stderr, flush=True)
 
 
 @dataclass(frozen=True)
