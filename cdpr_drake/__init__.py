@@ -11,9 +11,10 @@ Pieces are in `cdpr_drake.systems`, loops in `cdpr_drake.diagrams`, questions to
 """
 
 import importlib
-from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
-from cdpr_drake.model.robot import CableRobot, load_robot, robot_names, save_robot
+if TYPE_CHECKING:
+    from cdpr_drake.model.robot import CableRobot, load_robot, robot_names, save_robot
 
 __version__ = "0.2.0.dev0"
 
@@ -22,8 +23,15 @@ __all__ = ["CableRobot", "__version__", "load_robot", "robot_names", "save_robot
 _ROOMS = ("diagrams", "experiments", "model", "show", "study", "systems")
 
 
-def __getattr__(name: str) -> ModuleType:
-    """Import a room of the package, by its `name`, when it is first asked for."""
+def __getattr__(name: str) -> Any:
+    """Import a room of the package, or what it offers of robots, by `name` when first asked for."""
     if name in _ROOMS:
         return importlib.import_module(f"cdpr_drake.{name}")
+    if name in __all__:
+        return getattr(importlib.import_module("cdpr_drake.model.robot"), name)
     raise AttributeError(f"module 'cdpr_drake' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    """Return what there is, imported already or not."""
+    return sorted({*globals(), *__all__, *_ROOMS})

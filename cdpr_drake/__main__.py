@@ -1,13 +1,14 @@
-"""The command line, `cdpr-drake` or `python -m cdpr_drake`: arguments, dispatch, exit status."""
+"""The command line, `cdpr-drake` or `python -m cdpr_drake`: its exit status, errors on one line."""
 
 from __future__ import annotations
 
 import os
 import sys
-from argparse import Namespace
 from collections.abc import Sequence
 
-from cdpr_drake.commands.arguments import UsageError, parse
+from cdpr_drake.commands import UsageError
+from cdpr_drake.commands.parsing import parse
+from cdpr_drake.commands.terminal import print_message, warnings_on_one_line
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -20,75 +21,20 @@ def main(argv: Sequence[str] | None = None) -> int:
         SystemExit: after --help and --version.
     """
     try:
-        status = dispatch(parse(sys.argv[1:] if argv is None else argv))
+        command, options = parse(sys.argv[1:] if argv is None else argv)
+        with warnings_on_one_line():
+            status = command.work(options)
         sys.stdout.flush()
         return status
     except UsageError as error:
-        print(f"cdpr-drake: error: {' '.join(str(error).split())}", file=sys.stderr)
+        print_message(f"error: {error}")
         return 2
     except KeyboardInterrupt:
-        print("cdpr-drake: interrupted, nothing written", file=sys.stderr)
+        print_message("interrupted, nothing written")
         return 130
     except BrokenPipeError:  # whoever read the output has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-
-
-def dispatch(options: Namespace) -> int:
-    """Carry out the command that was asked for and return its exit status.
-
-    Args:
-        options: the parsed arguments.
-
-    Raises:
-        UsageError: the input cannot be used; nothing was run or written.
-        SystemExit: after the help, if no command was given.
-    """
-    # Each command is imported only when it is asked for: Drake takes its time.
-    if options.command is None:
-        parse(["--help"])
-    from cdpr_drake.commands.terminal import warnings_on_one_line
-
-    with warnings_on_one_line():
-        if options.command == "robots":
-            from cdpr_drake.commands.robots import list_robots
-
-            return list_robots()
-        if options.command == "linearize":
-            from cdpr_drake.commands.linearize import linearize_command
-
-            return linearize_command(options)
-        if options.command == "stability":
-            from cdpr_drake.commands.stability import stability_command
-
-            return stability_command(options)
-        if options.command == "coupling":
-            from cdpr_drake.commands.coupling import coupling_command
-
-            return coupling_command(options)
-        if options.command == "explore":
-            from cdpr_drake.commands.explore import explore_command
-
-            return explore_command(options)
-        if options.command == "ablate":
-            from cdpr_drake.commands.ablate import ablate_command
-
-            return ablate_command(options)
-        if options.command == "calibrate":
-            from cdpr_drake.commands.calibrate import calibrate_command
-
-            return calibrate_command(options)
-        if options.command == "reproduce":
-            from cdpr_drake.commands.reproduce import reproduce_command
-
-            return reproduce_command(options)
-        if options.command == "sweep":
-            from cdpr_drake.commands.sweep import sweep_command
-
-            return sweep_command(options)
-        from cdpr_drake.commands.run import run_command
-
-        return run_command(options)
 
 
 if __name__ == "__main__":

@@ -170,7 +170,7 @@ def test_the_command_tells_it_and_writes_it_down(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setenv("COLUMNS", "70")
-    monkeypatch.setattr("cdpr_drake.commands.ablate.ablate", lambda *args, **options: canned)
+    monkeypatch.setattr("cdpr_drake.experiments.ablation.ablate", lambda *args, **options: canned)
     folder = tmp_path / "out"
     assert main(["ablate", "--robot", "cogiro", "--output", str(folder)]) == 0
     out = capsys.readouterr().out

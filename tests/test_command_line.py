@@ -24,8 +24,9 @@ from conftest import heed_interrupts
 
 from cdpr_drake.__main__ import main
 from cdpr_drake.commands import kernels
-from cdpr_drake.commands.arguments import parse, parse_pose
+from cdpr_drake.commands.arguments import parse_pose
 from cdpr_drake.commands.files import staged
+from cdpr_drake.commands.parsing import parse
 from cdpr_drake.commands.terminal import Column, Progress, fitting, table
 from cdpr_drake.model.robot import load_robot, robot_names
 
@@ -227,7 +228,7 @@ def test_poses(text: str, pose: list[float]) -> None:
 
 
 def test_a_pose_may_start_with_a_minus() -> None:
-    options = parse(["run", "--from", "-1,0,2", "--to=-.5,0,2", "--seed", "3"])
+    options = parse(["run", "--from", "-1,0,2", "--to=-.5,0,2", "--seed", "3"]).options
     assert options.start[3:] == [-1.0, 0.0, 2.0] and options.goal[3:] == [-0.5, 0.0, 2.0]
 
 
@@ -330,7 +331,7 @@ def refusal(capsys: pytest.CaptureFixture[str], argv: list[str], status: int = 2
     ("argv", "message"),
     [
         (["fly"], "argument COMMAND: invalid choice: 'fly'"),
-        (["run", "--bogus"], "unrecognized arguments: --bogus (try cdpr-drake --help)"),
+        (["run", "--bogus"], "unrecognized arguments: --bogus (try cdpr-drake run --help)"),
         (["run", "--test", "6"], "no test 6; the paper's tests are 1, 2, 3, 4, 5"),
         (["run", "--test", "x"], "argument --test: invalid int value: 'x' (try cdpr-drake run"),
         (["run", "--robot", "nope"], "nope: No such file or directory; built-in robots: cogiro,"),

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.__main__ import main
-from cdpr_drake.commands.arguments import parse
-from cdpr_drake.commands.plan import describe, plan
+from cdpr_drake.commands.parsing import parse
+from cdpr_drake.commands.run import Plan, describe, plan
 from cdpr_drake.diagrams import make_vision_based_control
 from cdpr_drake.experiments import Setup, paper_test, prepare
 from cdpr_drake.experiments.moves import move_near_the_middle
@@ -295,17 +295,20 @@ def test_the_demo_heeds_the_rule_and_a_test_asked_for_keeps_its_own(
 
 
 def test_a_slow_gain_has_the_time_it_needs(robot_file: Any) -> None:
+    def planned(*argv: str) -> Plan:
+        return plan(parse(["run", *argv]).options)
+
     def until(**changes: Any) -> float:
-        return plan(parse(["run", "--robot", robot_file(**changes)])).setups[0].until
+        return planned("--robot", robot_file(**changes)).setups[0].until
 
     assert until(gain=0.05) == 160.0
     assert until(gain=0.003) == 400.0
-    found = plan(parse(["run", "--robot", robot_file(gain=0.003)]))
+    found = planned("--robot", robot_file(gain=0.003))
     assert "It ends after 1.2 of the gain's time constants" in describe(
         found.name, found.setups[0], found.chosen
     )
-    assert plan(parse(["run", "--robot", "cogiro-22m", "--gain", "0.05"])).setups[0].until == 80.0
-    found = plan(parse(["run", "--robot", "cogiro-22m", "--until", "400"]))
+    assert planned("--robot", "cogiro-22m", "--gain", "0.05").setups[0].until == 80.0
+    found = planned("--robot", "cogiro-22m", "--until", "400")
     assert "It ends" not in describe(found.name, found.setups[0], found.chosen)
 
 

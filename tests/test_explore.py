@@ -18,7 +18,6 @@ import pytest
 from conftest import find_chromium, heed_interrupts
 
 from cdpr_drake.__main__ import main
-from cdpr_drake.commands import explore
 from cdpr_drake.model.equilibrium import rest_state
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.show.explore_page import HOST, explore_page, panel_html
@@ -318,7 +317,7 @@ def test_the_command_follows_a_scripted_slider(
             click(self, STOP)
             return super().run(idle)
 
-    monkeypatch.setattr(explore, "Explorer", Scripted)
+    monkeypatch.setattr("cdpr_drake.show.explorer.Explorer", Scripted)
     monkeypatch.setenv("COLUMNS", "80")
     options: list[Any] = ["--payload", "60", "--pose", "-2,-0.6,1.7", "--idle", "0.2"]
     assert main(["explore", *options]) == 0

@@ -22,7 +22,6 @@ from conftest import find_chromium
 from fake_paper import FakeTable
 
 from cdpr_drake.__main__ import main
-from cdpr_drake.commands import reproduce as command
 from cdpr_drake.experiments.reproduction import figures, figures_claims, poses, sources
 from cdpr_drake.experiments.reproduction import reproduce as machinery
 from cdpr_drake.experiments.reproduction.assumptions import printed
@@ -423,7 +422,7 @@ def test_the_command_writes_a_report_and_tells_what_it_found(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     fakes = {"one": FakeTable("one", [1.0, 2.0]), "two": FakeTable("two", [-2.0])}
-    monkeypatch.setattr(command, "reproductions", lambda: fakes)
+    monkeypatch.setattr("cdpr_drake.experiments.reproduction.registry.reproductions", lambda: fakes)
     assert main(["reproduce", "--only", "one", "--jobs", "1"]) == 0
     out, err = capfd.readouterr()
     assert "2 of 2 cases, in " in err
@@ -455,7 +454,7 @@ def test_an_interrupted_command_says_how_to_go_on(
         progress(1, 2)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(command, "reproduce", interrupted)
+    monkeypatch.setattr(machinery, "reproduce", interrupted)
     assert main(["reproduce"]) == 130
     err = capsys.readouterr().err
     assert "1 of 2 cases" in err and "the same command goes on" in err

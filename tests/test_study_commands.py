@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.__main__ import main
-from cdpr_drake.commands.answer import counted
+from cdpr_drake.commands.terminal import counted
 from cdpr_drake.diagrams import make_vision_based_control
 from cdpr_drake.experiments import Setup, prepare, setup_of_test
 from cdpr_drake.experiments.runs import doubt_about_gain

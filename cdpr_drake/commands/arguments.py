@@ -1,43 +1,18 @@
-"""The arguments of the command line. Importing this imports no robot: --help answers at once."""
+"""Arguments that several commands have, and what argparse makes of their texts.
+
+A constant holds what `add_argument` takes after the name: `group.add_argument("--robot", **ROBOT)`.
+"""
 
 from __future__ import annotations
 
 import argparse
-import re
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
-from cdpr_drake import __version__
-
-EPILOG = (
-    "Exit status: 0, done; 1, a run left what the model covers, or results could not be written; "
-    "2, the input cannot be used, and nothing was run; 130, interrupted."
-)
-
-
-class UsageError(Exception):
-    """The arguments do not make sense; the message is for the user."""
-
-
-class _Parser(argparse.ArgumentParser):
-    """A parser that raises, so that an error is one line wherever it comes from."""
-
-    def error(self, message: str) -> NoReturn:
-        raise UsageError(f"{message} (try {self.prog} --help)")
-
-
-def parse(argv: Sequence[str]) -> argparse.Namespace:
-    """Return the parsed arguments, `command` among them.
-
-    Args:
-        argv: the arguments, without the program's name.
-
-    Raises:
-        UsageError: they do not make sense.
-        SystemExit: after --help and --version.
-    """
-    return _build_parser().parse_args(_attach_negative_values(argv))
+FEWEST, MOST = 2, 400
+"""Of the values in a span."""
 
 
 def parse_pose(text: str) -> list[float]:
@@ -49,13 +24,8 @@ def parse_pose(text: str) -> list[float]:
     Raises:
         argparse.ArgumentTypeError: it is no such text.
     """
-    import math
-
-    try:
-        values = [float(part) for part in text.split(",")]
-    except ValueError:
-        values = []
-    if len(values) not in (3, 6) or not all(map(math.isfinite, values)):
+    values = _numbers(text)
+    if len(values) not in (3, 6):
         raise argparse.ArgumentTypeError(
             f"{text!r} is neither x,y,z [m] nor x,y,z,roll,pitch,yaw [m, deg]"
         )
@@ -63,136 +33,152 @@ def parse_pose(text: str) -> list[float]:
     return [*angles, *values[:3]]
 
 
+def parse_range(text: str) -> tuple[float, float]:
+    """Return (from, to) of a `text` "value" or "from,to"."""
+    values = _numbers(text)
+    if len(values) not in (1, 2) or values[0] > values[-1]:
+        raise argparse.ArgumentTypeError(f"{text!r} is neither a number nor FROM,TO")
+    return values[0], values[-1]
+
+
+def parse_span(text: str) -> tuple[float, float, int]:
+    """Return (from, to, how many) of a `text` "from,to,n"."""
+    values = _numbers(text)
+    if len(values) != 3 or not 0.0 <= values[0] < values[1] or values[2] % 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not FROM,TO,N with 0 <= FROM < TO")
+    if not FEWEST <= values[2] <= MOST:
+        raise argparse.ArgumentTypeError(f"{text!r}: N is from {FEWEST} to {MOST}")
+    return values[0], values[1], int(values[2])
+
+
+def parse_count(text: str) -> int:
+    """Return the integer, at least 1, of a `text`."""
+    try:
+        count = int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be an integer, got {text!r}") from None
+    if count < 1:
+        raise argparse.ArgumentTypeError(f"must be at least 1, got {text}")
+    return count
+
+
+def parse_names(text: str) -> list[str]:
+    """Return the names in a `text`, separated by commas."""
+    return [part.strip() for part in text.split(",") if part.strip()]
+
+
+def parse_model(text: str) -> str:
+    """Return the name of a cable model, which on a command line may be written in lower case.
+
+    The names are the same everywhere, ECM, CMWE, SCMWE and SLSM, and in Python and files there is
+    no other way to write them; but whoever types a command need not hold shift.
+
+    Args:
+        text: as it was typed.
+    """
+    return text.strip().upper()
+
+
 def parse_models(text: str) -> list[str]:
     """Return the names of cable models in a `text`, separated by commas."""
-    return [part.strip().upper() for part in text.split(",") if part.strip()]
+    return [parse_model(name) for name in parse_names(text)]
 
 
-def _attach_negative_values(argv: Sequence[str]) -> list[str]:
-    """Write "--from -1,0,2" as "--from=-1,0,2": argparse takes the former for two options."""
-    attached: list[str] = []
-    for argument in argv:
-        previous = attached[-1] if attached else ""
-        if previous.startswith("--") and "=" not in previous and re.match(r"-[\d.]", argument):
-            attached[-1] = f"{previous}={argument}"
-        else:
-            attached.append(argument)
-    return attached
+def parse_rule(text: str) -> str:
+    """Return a rule for tensions of a `text` that may have hyphens, to need no quotes."""
+    return text.strip().lower().replace("-", " ")
 
 
-def _build_parser() -> argparse.ArgumentParser:
-    parser = _Parser(
-        prog="cdpr-drake",
-        description="Vision-based control of cable-driven parallel robots with sagging cables.",
-        epilog=EPILOG,
-        allow_abbrev=False,
-    )
-    parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND", title="commands")
-    _add_run(commands)
-    from cdpr_drake.commands.study_arguments import add_study_commands  # imports this module
+def positive(unit: str, or_zero: bool = False) -> Callable[[str], float]:
+    """Return what makes a positive, finite number of a text.
 
-    add_study_commands(commands)
-    from cdpr_drake.commands.calibrate_arguments import add_calibrate
+    Args:
+        unit: of the number, for messages.
+        or_zero: whether it may be 0.
+    """
 
-    add_calibrate(commands)
-    from cdpr_drake.commands.reproduce_arguments import add_reproduce
+    def parse(text: str) -> float:
+        values = _numbers(text)
+        if len(values) != 1 or values[0] < 0.0 or (values[0] == 0.0 and not or_zero):
+            least = ">= 0" if or_zero else "positive"
+            raise argparse.ArgumentTypeError(f"must be {least} and finite, got {text}{unit}")
+        return values[0]
 
-    add_reproduce(commands)
-    from cdpr_drake.commands.sweep_arguments import add_sweep
-
-    add_sweep(commands)
-    from cdpr_drake.commands.ablate_arguments import add_ablate
-
-    add_ablate(commands)
-    commands.add_parser(
-        "robots",
-        help="list the built-in robots",
-        description="List the built-in robots: size, mass, cables, description.",
-        allow_abbrev=False,
-    )
-    return parser
+    return parse
 
 
-def _add_run(commands: argparse._SubParsersAction[_Parser]) -> None:
-    run = commands.add_parser(
-        "run",
-        help="move a robot from one pose to another under one or more controllers",
-        description=(
-            "Move a robot from one pose to another under vision-based control (VBC) with one or "
-            "more cable models, and under joint space control (JSC); compare the runs, and write "
-            "logs, a summary, figures and a replay. Without options: Test 4 of Dallej et al. 2019 "
-            "on CoGiRo, with VBC on sagging (SCMWE) and on straight cables (SLSM), and with JSC."
-        ),
-        epilog=EPILOG,
-        allow_abbrev=False,
-    )
-    what = run.add_argument_group("what moves, and where")
-    what.add_argument(
-        "--test", type=int, metavar="N",
-        help="one of the paper's Tests 1 to 5: poses, payload, gain, time (default: 4 for CoGiRo, "
-        "a short move near its middle for another robot)",
-    )  # fmt: skip
-    what.add_argument(
-        "--robot", default=None, metavar="NAME|FILE",
-        help="a built-in robot, or a robot file (default: cogiro)",
-    )  # fmt: skip
-    what.add_argument("--payload", type=float, metavar="KG", help="mass carried")
-    for name, text in (("from", "start"), ("to", "goal")):
-        what.add_argument(
-            f"--{name}", dest=text, type=parse_pose, metavar="X,Y,Z[,R,P,Y]",
-            help=f"the platform's {text}: position [m]; roll, pitch, yaw [deg], level if left out",
-        )  # fmt: skip
-
-    _add_control(run.add_argument_group("how it is controlled"))
-    out = run.add_argument_group("what comes out")
-    out.add_argument(
-        "--output", type=Path, metavar="DIR", help="(default: a directory in ./out, which it names)"
-    )
-    out.add_argument("--json", action="store_true", help="print the summary as JSON, nothing else")
-    out.add_argument("--no-figures", action="store_true", help="write no figures")
-    out.add_argument("--no-replay", action="store_true", help="write no replay")
+def _numbers(text: str) -> Sequence[float]:
+    """Return the finite numbers in a text, separated by commas; none if one of them is not."""
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        return []
+    return values if all(map(math.isfinite, values)) else []
 
 
-def _add_control(how: Any) -> None:
-    how.add_argument(
-        "--controller", choices=("vbc", "jsc", "both"), default="both", help="(default: both)"
-    )
-    how.add_argument(
-        "--cable-model", type=parse_models, action="extend", metavar="MODEL,...",
-        help="of VBC: ECM, CMWE, SCMWE, SLSM; one run each (default: SCMWE,SLSM)",
-    )  # fmt: skip
-    how.add_argument(
-        "--gain", type=float, metavar="PER_S",
-        help="lambda [1/s] (default: that of --test; else the robot file's; else 0.1, or half the "
-        "limit at the goal if that is less)",
-    )  # fmt: skip
-    how.add_argument(
-        "--sample-time", type=float, metavar="S",
-        help="of the vision loop (default: the robot's); 0: all continuous, no latency",
-    )  # fmt: skip
-    how.add_argument(
-        "--latency", type=float, metavar="S", help="from image to motors (default: the robot's)"
-    )
-    how.add_argument(
-        "--sensors", default="gaussian", metavar="KIND",
-        help="what VBC's cameras deliver: gaussian, the truth with noise; targets, a pose from the "
-        "patterns' points and tangents from the cables' edges; images, the same detected in "
-        "rendered images, which is slow (default: gaussian)",
-    )  # fmt: skip
-    how.add_argument(
-        "--estimator", default="joint", metavar="KIND",
-        help="of the pose from targets: joint, over all images; mean, the paper's (default: joint)",
-    )  # fmt: skip
-    how.add_argument(
-        "--calibrated", metavar="NAME|FILE",
-        help="the robot as the controllers believe it, as `calibrate` writes it; start and goal "
-        "are the true robot's, in W (default: the true robot)",
-    )  # fmt: skip
-    how.add_argument("--no-noise", action="store_true", help="perfect cameras and load cells")
-    how.add_argument("--seed", type=int, default=0, metavar="N", help="of the noise (default: 0)")
-    how.add_argument(
-        "--until", type=float, metavar="S",
-        help="time to run (default: the test's, or 80; eight time constants of a gain that robot "
-        "file or limit decide, at most 400)",
-    )  # fmt: skip
+def _taking(metavar: str, help: str | None = None, **settings: Any) -> dict[str, Any]:
+    return {"metavar": metavar, **({"help": help} if help else {}), **settings}
+
+
+DEFAULT_RULE = "minimum norm"
+MODELS = "ECM, CMWE, SCMWE, SLSM"
+
+ROBOT = _taking("NAME|FILE", "a built-in robot, or a robot file (default: cogiro)")
+ROBOTS = _taking("NAME|FILE,...", type=parse_names, action="extend")
+PAYLOAD = _taking("KG", "mass carried (default: the test's; else the robot's)", type=float)
+POSE = _taking("X,Y,Z[,R,P,Y]", type=parse_pose)
+TENSIONS = _taking("RULE", "of those that balance the platform: minimum-norm, or within-limits of "
+                   "the robot (default: minimum-norm)",
+                   type=parse_rule, default=DEFAULT_RULE)  # fmt: skip
+CABLE_MODEL = _taking("MODEL", f"of the law: {MODELS} (default: SCMWE)",
+                      type=parse_model, default="SCMWE")  # fmt: skip
+CABLE_MODELS = _taking("MODEL,...", type=parse_models, action="extend")
+GAIN = _taking("PER_S", "lambda [1/s] (default: the robot file's; else 0.1, or half the limit at "
+               "the pose if that is less)", type=float)  # fmt: skip
+SAMPLE_TIME = _taking("S", "of the vision loop (default: the robot's)", type=float)
+LATENCY = _taking("S", "from image to motors (default: the robot's)", type=float)
+SPAN = _taking("FROM,TO,N", type=parse_span)
+SEED = _taking("N", "of all that is drawn at random (default: 0)", type=int, default=0)
+JOBS = _taking("N", "processes (default: as many as cores)", type=parse_count)
+NO_NOISE: dict[str, Any] = {"action": "store_true", "help": "perfect cameras and load cells"}
+
+
+def add_place(
+    parser: argparse.ArgumentParser,
+    robot: dict[str, Any] = ROBOT,
+    default: str = "for CoGiRo Test 4's, else part of the way to cable 1's drawing point",
+) -> Any:
+    """Add what `resolve_place` heeds and return its group; --tensions can be added to that.
+
+    Args:
+        parser: the parser.
+        robot: settings of --robot.
+        default: the pose if nobody asks for one, in words.
+    """
+    parser.set_defaults(tensions=DEFAULT_RULE)
+    group = parser.add_argument_group("which robot, and where")
+    group.add_argument("--robot", **robot)
+    group.add_argument("--payload", **PAYLOAD)
+    group.add_argument("--test", type=int, metavar="N",
+                       help="at the goal of one of the paper's Tests 1 to 5, with its "
+                       "payload")  # fmt: skip
+    group.add_argument("--pose", **POSE,
+                       help="position [m]; roll, pitch, yaw [deg] (default: "
+                       f"{default})")  # fmt: skip
+    return group
+
+
+def add_output(parser: argparse.ArgumentParser) -> Any:
+    """Add what `write_answer` heeds, --output, --json, --no-figures, and return its group.
+
+    Args:
+        parser: the parser.
+    """
+    group = parser.add_argument_group("what comes out")
+    group.add_argument("--output", type=Path, metavar="DIR",
+                       help="where files go (default: a directory in ./out, which it "
+                       "names)")  # fmt: skip
+    group.add_argument("--json", action="store_true",
+                       help="print the summary as JSON, nothing else")  # fmt: skip
+    group.add_argument("--no-figures", action="store_true", help="write no figures")
+    return group

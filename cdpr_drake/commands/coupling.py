@@ -2,96 +2,104 @@
 
 from __future__ import annotations
 
-import argparse
+import math
 import sys
-from typing import Any
+from argparse import ArgumentParser, Namespace
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from cdpr_drake.commands.answer import counted, leave, wrapped
-from cdpr_drake.commands.arguments import UsageError
-from cdpr_drake.commands.gain import gain_in_words, gain_values
-from cdpr_drake.commands.kernels import compilation_announced
-from cdpr_drake.commands.place import as_file_name, place, pose_values, with_payload
-from cdpr_drake.commands.terminal import Column, fitting, table, width_of
-from cdpr_drake.errors import CdprError
-from cdpr_drake.model.cable_models import CABLE_MODELS
-from cdpr_drake.model.robot import load_robot
-from cdpr_drake.study import (
-    Comparison,
-    DefaultGain,
-    ModelComparison,
-    comparable_pose,
-    compare_cable_models,
-    default_gain,
-    lowest_gain,
+from cdpr_drake.commands import Command
+from cdpr_drake.commands import arguments as common
+from cdpr_drake.commands.files import write_answer
+from cdpr_drake.commands.resolve import (
+    gain_in_words,
+    gain_values,
+    input_refused,
+    pose_values,
+    resolve_place,
 )
-from cdpr_drake.study.compare import ROBOTS
+from cdpr_drake.commands.terminal import Column, counted, fitting, table, width_of, wrapped
+
+if TYPE_CHECKING:
+    from cdpr_drake.study import Comparison, DefaultGain, ModelComparison
 
 
-def coupling_command(options: argparse.Namespace) -> int:
-    """Carry out `cdpr-drake coupling` and return the exit status.
+def _add_arguments(parser: ArgumentParser) -> None:
+    several = "built-in robots, or robot files (default: cogiro and its three larger versions)"
+    robots = {**common.ROBOTS, "help": several}
+    what = common.add_place(parser, robots, "part of the way to cable 1's drawing point")
+    what.add_argument("--tensions", **common.TENSIONS)
+    how = parser.add_argument_group("how it is controlled")
+    how.add_argument("--cable-model", **common.CABLE_MODELS,
+                     help="of the law (default: ECM,CMWE,SCMWE,SLSM)")  # fmt: skip
+    how.add_argument("--gain", type=common.positive("/s"), metavar="PER_S",
+                     help="lambda of the figure [1/s] (default: the robot file's; else 0.1, or "
+                     "half the limit at the pose if that is less; the lowest of robots and "
+                     "models)")  # fmt: skip
+    common.add_output(parser)
 
-    Args:
-        options: the parsed arguments.
 
-    Raises:
-        UsageError: the input cannot be used; nothing was written.
-    """
-    if options.gain is not None and not (np.isfinite(options.gain) and options.gain > 0.0):
-        raise UsageError(f"--gain: must be positive and finite, got {options.gain:g}/s")
-    try:
-        with compilation_announced():
-            comparison = _compare(options)
-            chosen = _lowest_gain(comparison) if options.gain is None else None
-    except (CdprError, ValueError) as error:
-        raise UsageError(str(error)) from error
+def _compare_models(options: Namespace) -> int:
+    with input_refused():
+        comparison = _compare(options)
+        chosen = _lowest_gain(options, comparison) if options.gain is None else None
     gain = options.gain if chosen is None else chosen.gain
-    rows = [_row(row) for row in comparison.rows]
-    summary = {**gain_values(gain, chosen), "rows": rows}
+    summary = {**gain_values(gain, chosen), "rows": [_row(row) for row in comparison.rows]}
     columns = fitting(_columns(comparison), width_of(sys.stdout))
     meaning = " ".join(column.meaning for column in columns if column.meaning)
     lines = [table(columns), "", *wrapped(meaning)]
     if chosen is not None and chosen.reason():
         text = gain_in_words(gain, chosen, "at one of these poses")
         lines += wrapped(f"In the figure {text}.")
-
-    def figures() -> dict[str, Any]:
-        from cdpr_drake.show import rates_and_responses_figure
-
-        return {"rates_and_responses": rates_and_responses_figure(comparison, gain)}
-
     names = "-".join(dict.fromkeys(row.robot for row in comparison.rows))
-    name = as_file_name(names) if options.robot else "sizes"
-    return leave(options, f"coupling-{name}", summary, lines, figures)
+    return write_answer(
+        options,
+        f"coupling-{names if options.robot else 'sizes'}",
+        summary,
+        lines,
+        lambda show: {"rates_and_responses": show.rates_and_responses_figure(comparison, gain)},
+    )
 
 
-def _compare(options: argparse.Namespace) -> Comparison:
+COMMAND = Command(
+    summary="compare the cable models by their gain matrices",
+    description="Compare cable models by the gain matrix Gamma, motion had per motion asked for, "
+    "without simulation: rates of convergence over lambda, coupling, and how far moves stray from "
+    "the straight way. Draws rates and responses.",
+    example="--robot cogiro,cogiro-98m",
+    add_arguments=_add_arguments,
+    work=_compare_models,
+)
+
+
+def _compare(options: Namespace) -> Comparison:
     """Return the comparison, a robot at a time, with the count of them on stderr."""
+    from cdpr_drake.model.cable_models import CABLE_MODELS
+    from cdpr_drake.study import Comparison, compare_cable_models
+    from cdpr_drake.study.compare import ROBOTS
+
     names = list(dict.fromkeys(options.robot or ROBOTS))
     models = list(dict.fromkeys(options.cable_model or CABLE_MODELS))
     if len(names) > 1 and (options.test is not None or options.pose is not None):
         raise ValueError("--test and --pose are for one robot, and robots differ in size")
     rows: list[ModelComparison] = []
     for name in counted(names, "robots"):
-        robot = with_payload(load_robot(name), options.payload)
-        pose = comparable_pose(robot)
-        if options.test is not None or options.pose is not None:
-            asked = argparse.Namespace(**{**vars(options), "robot": name})
-            robot, pose, _ = place(asked)
-        rows += compare_cable_models([robot], models, poses={robot.name: pose}).rows
+        robot, pose, _, tensions = resolve_place(options, name, default_test=None)
+        poses = {robot.name: pose}
+        rows += compare_cable_models([robot], models, poses=poses, tensions=tensions).rows
     return Comparison(rows=tuple(rows))
 
 
-def _lowest_gain(comparison: Comparison) -> DefaultGain:
+def _lowest_gain(options: Namespace, comparison: Comparison) -> DefaultGain:
     """Return the gain that is good for all rows: they are drawn at one."""
 
-    def found(row: ModelComparison) -> DefaultGain:
+    from cdpr_drake.study import default_gain, lowest_gain
+
+    found, rule = [], options.tensions
+    for row in comparison.rows:
         robot = row.gamma.rest.robot
         timing = robot.cameras.sample_time, robot.cameras.latency
-        return default_gain(robot, row.gamma.pose, row.cable_model, *timing)
-
-    return lowest_gain(found(row) for row in comparison.rows)
+        found.append(default_gain(robot, row.gamma.pose, row.cable_model, *timing, tensions=rule))
+    return lowest_gain(found)
 
 
 def _row(row: ModelComparison) -> dict[str, Any]:
@@ -115,43 +123,28 @@ def _row(row: ModelComparison) -> dict[str, Any]:
 def _aside(row: ModelComparison) -> float:
     """Return the largest motion across an axis of M per motion asked for along it [mm/m]."""
     across = row.gamma.coupling[3:, 3:]
-    return float(1e3 * np.linalg.norm(across, axis=0).max())
+    return 1e3 * math.sqrt((across**2).sum(axis=0).max())
 
 
 def _columns(comparison: Comparison) -> list[Column]:
     rows = comparison.rows
+    # fmt: off
     return [
-        Column(heading=("robot", ""), cells=[r.robot for r in rows], to_the_left=True),
-        Column(heading=("size", "m"), cells=[f"{r.size:.0f}" for r in rows], rank=3),
-        Column(heading=("model", ""), cells=[r.cable_model for r in rows], to_the_left=True),
-        Column(
-            heading=("slowest", "/ lambda"),
-            cells=[f"{r.slowest:.4f}" for r in rows],
-            meaning="Slowest, fastest: rates of convergence over lambda, the eigenvalues of "
-            "Gamma; 1 for an exact model, unstable below 0.",
-        ),
-        Column(
-            heading=("fastest", "/ lambda"),
-            cells=[f"{r.gamma.eigenvalues.real.max():.4f}" for r in rows],
-            rank=2,
-        ),
-        Column(
-            heading=("aside", "mm/m"),
-            cells=[f"{_aside(r):.2f}" for r in rows],
-            rank=1,
-            meaning="Aside: motion across per motion asked for, off Gamma's diagonal.",
-        ),
-        Column(
-            heading=("strays", "mm"),
-            cells=[f"{r.excursion_mm:.2f}" for r in rows],
-            meaning="Strays: farthest from the straight way, of moves by a tenth of the robot's "
-            "size.",
-        ),
-        Column(heading=("", "deg"), cells=[f"{r.excursion_deg:.3f}" for r in rows], rank=4),
-        Column(
-            heading=("sag", "deg"),
-            cells=[f"{r.dbeta_deg:.1f}" for r in rows],
-            rank=5,
-            meaning="Sag: largest angle from chord to cable at the platform.",
-        ),
+        Column(("robot", ""), [r.robot for r in rows], to_the_left=True),
+        Column(("size", "m"), [f"{r.size:.0f}" for r in rows], rank=3),
+        Column(("model", ""), [r.cable_model for r in rows], to_the_left=True),
+        Column(("slowest", "/ lambda"), [f"{r.slowest:.4f}" for r in rows],
+               meaning="Slowest, fastest: rates of convergence over lambda, the eigenvalues of "
+               "Gamma; 1 for an exact model, unstable below 0."),
+        Column(("fastest", "/ lambda"),
+               [f"{r.gamma.eigenvalues.real.max():.4f}" for r in rows], rank=2),
+        Column(("aside", "mm/m"), [f"{_aside(r):.2f}" for r in rows], rank=1,
+               meaning="Aside: motion across per motion asked for, off Gamma's diagonal."),
+        Column(("strays", "mm"), [f"{r.excursion_mm:.2f}" for r in rows],
+               meaning="Strays: farthest from the straight way, of moves by a tenth of the robot's "
+               "size."),
+        Column(("", "deg"), [f"{r.excursion_deg:.3f}" for r in rows], rank=4),
+        Column(("sag", "deg"), [f"{r.dbeta_deg:.1f}" for r in rows], rank=5,
+               meaning="Sag: largest angle from chord to cable at the platform."),
     ]
+    # fmt: on

@@ -1,22 +1,33 @@
-"""What a run leaves on disk: all of it, or nothing."""
+"""What a command leaves on disk: all of it, or nothing."""
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import csv
 import json
 import os
+import re
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
+from cdpr_drake import __version__
+from cdpr_drake.commands import UsageError
+from cdpr_drake.commands.terminal import print_message, print_wrapped
 
-from cdpr_drake.commands.terminal import say
-from cdpr_drake.diagrams import Record
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
+    from cdpr_drake.diagrams import Record
+
+Figures = Callable[[ModuleType], Mapping[str, "Figure"]]
+
+DOTS_PER_INCH = 100
 SUMMARY = "summary.json"
 SUFFIXES = (".csv", ".html", ".json", ".pdf", ".png", ".svg", ".yaml")
 
@@ -65,7 +76,9 @@ def staged(directory: Path) -> Iterator[Path]:
         yield folder
         stale = _files_of_earlier_run(directory)
         if stale:
-            say(f"note: {directory} held an earlier run, now replaced; --output DIR keeps both")
+            print_message(
+                f"note: {directory} held an earlier run, now replaced; --output DIR keeps both"
+            )
         directory.mkdir(parents=True, exist_ok=True)
         for file in sorted(folder.iterdir()):
             os.replace(file, directory / file.name)
@@ -85,6 +98,57 @@ def _files_of_earlier_run(directory: Path) -> set[str]:
         return set()
 
 
+def write_answer(
+    options: argparse.Namespace,
+    name: str,
+    summary: dict[str, Any],
+    lines: Iterable[str],
+    figures: Figures,
+    texts: Mapping[str, str] | None = None,
+) -> int:
+    """Write summary and figures, print the answer or its JSON, and return the exit status.
+
+    Args:
+        options: with output, json and no_figures.
+        name: of the directory, if the options do not say.
+        summary: plain values; gains "cdpr_drake", "drake" and "files".
+        lines: of the answer.
+        figures: makes them with `cdpr_drake.show`, by the names of their files without ".png".
+        texts: other files, by their names.
+
+    Raises:
+        UsageError: the directory cannot be used.
+    """
+    directory = options.output or Path("out") / as_file_name(name)
+    summary = {**summary, "cdpr_drake": __version__, "drake": version("drake"), "files": [SUMMARY]}
+    try:
+        with staged(directory) as folder:
+            if not options.no_figures:
+                from cdpr_drake import show
+
+                for file, figure in figures(show).items():
+                    figure.savefig(folder / f"{file}.png", dpi=DOTS_PER_INCH)
+                    summary["files"].append(f"{file}.png")
+            for file, text in (texts or {}).items():
+                (folder / file).write_text(text, encoding="utf-8")
+                summary["files"].append(file)
+            (folder / SUMMARY).write_text(f"{to_json(summary)}\n", encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"--output {directory}: {error.strerror or error}") from error
+    if options.json:
+        print(to_json(summary))
+        return 0
+    for line in lines:
+        print(line)
+    print_wrapped(f"In {directory}: {', '.join(summary['files'])}", indent="    ")
+    return 0
+
+
+def as_file_name(text: str) -> str:
+    """Return a `text` as the name of a file or directory."""
+    return re.sub(r"[^\w.-]+", "-", text).strip(".-") or "robot"
+
+
 def write_log(path: Path, record: Record) -> None:
     """Write a record as CSV: a line for each time, a heading that names each column and its unit.
 
@@ -92,6 +156,8 @@ def write_log(path: Path, record: Record) -> None:
         path: of the file.
         record: the record.
     """
+    import numpy as np
+
     headings, values = ["time [s]"], [record.time]
     for name, columns in COLUMNS.items():
         if name not in record.signals:
@@ -104,16 +170,6 @@ def write_log(path: Path, record: Record) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, lineterminator="\n").writerow(headings)
         np.savetxt(file, np.column_stack(values), fmt="%.9g", delimiter=",")
-
-
-def write_summary(path: Path, summary: dict[str, Any]) -> None:
-    """Write a summary as JSON.
-
-    Args:
-        path: of the file.
-        summary: plain values.
-    """
-    path.write_text(to_json(summary) + "\n", encoding="utf-8")
 
 
 def to_json(summary: dict[str, Any]) -> str:

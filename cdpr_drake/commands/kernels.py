@@ -13,7 +13,7 @@ import threading
 from collections.abc import Iterator
 from typing import Any
 
-from cdpr_drake.commands.terminal import say
+from cdpr_drake.commands.terminal import print_message
 from cdpr_drake.model.kernels import is_compiled
 
 _PREFIX = "cdpr_drake.model.kernels."
@@ -27,7 +27,9 @@ def compilation_announced() -> Iterator[None]:
     """
     if not is_compiled():
         yield
-        say("note: numba is not installed or off; runs take several times longer without it")
+        print_message(
+            "note: numba is not installed or off; runs take several times longer without it"
+        )
         return
     finished = threading.Event()
     earlier = _compiled()
@@ -35,7 +37,7 @@ def compilation_announced() -> Iterator[None]:
     def watch() -> None:
         while not finished.wait(0.1):
             if _compiled() > earlier:
-                say("compiling kernels on their first use; this takes up to a minute ...")
+                print_message("compiling kernels on their first use; this takes up to a minute ...")
                 return
 
     thread = threading.Thread(target=watch, daemon=True)
@@ -49,12 +51,12 @@ def compilation_announced() -> Iterator[None]:
 
 def compile_ahead() -> None:
     """Compile the kernels that the default run needs, unless that was done before."""
-    from cdpr_drake.commands.arguments import parse
-    from cdpr_drake.commands.plan import plan
+    from cdpr_drake.commands.parsing import parse
+    from cdpr_drake.commands.run import plan
     from cdpr_drake.experiments import prepare
 
     with compilation_announced():
-        for setup in plan(parse(["run"])).setups:
+        for setup in plan(parse(["run"]).options).setups:
             prepare(setup)
 
 

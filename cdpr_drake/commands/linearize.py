@@ -2,72 +2,54 @@
 
 from __future__ import annotations
 
-import argparse
-from typing import Any
+from argparse import ArgumentParser, Namespace
+from typing import TYPE_CHECKING, Any
 
-from cdpr_drake.commands.answer import leave, note, wrapped
-from cdpr_drake.commands.arguments import UsageError
-from cdpr_drake.commands.gain import gain_in_words, gain_values
-from cdpr_drake.commands.kernels import compilation_announced
-from cdpr_drake.commands.place import as_file_name, in_words, place, pose_values
-from cdpr_drake.diagrams import make_vision_based_control
-from cdpr_drake.errors import CdprError
-from cdpr_drake.study import (
-    Mode,
-    Modes,
-    default_gain,
-    equilibrium,
-    linearize,
-    modes,
-    one_period_map,
+from cdpr_drake.commands import Command, UsageError
+from cdpr_drake.commands import arguments as common
+from cdpr_drake.commands.files import write_answer
+from cdpr_drake.commands.resolve import (
+    Place,
+    gain_in_words,
+    gain_values,
+    input_refused,
+    resolve_gain,
+    resolve_place,
+    resolve_timing,
 )
-from cdpr_drake.study.modes import named
+from cdpr_drake.commands.terminal import print_message, wrapped
+
+if TYPE_CHECKING:
+    from cdpr_drake.study import Mode, Modes
 
 
-def linearize_command(options: argparse.Namespace) -> int:
-    """Carry out `cdpr-drake linearize` and return the exit status.
+def _add_arguments(parser: ArgumentParser) -> None:
+    common.add_place(parser).add_argument("--tensions", **common.TENSIONS)
+    how = parser.add_argument_group("how it is controlled")
+    how.add_argument("--cable-model", **common.CABLE_MODEL)
+    how.add_argument("--gain", **common.GAIN)
+    how.add_argument("--continuous", action="store_true", help="neither sampled nor late")
+    how.add_argument("--sample-time", **common.SAMPLE_TIME)
+    how.add_argument("--latency", **common.LATENCY)
+    common.add_output(parser)
 
-    Args:
-        options: the parsed arguments.
 
-    Raises:
-        UsageError: the input cannot be used; nothing was written.
-    """
+def _linearize(options: Namespace) -> int:
+    from cdpr_drake.study.modes import named
+
     if options.continuous and (options.sample_time is not None or options.latency is not None):
         raise UsageError("--continuous: then there is neither --sample-time nor --latency")
-    try:
-        robot, pose, where = place(options)
-        cameras = robot.cameras
-        period = cameras.sample_time if options.sample_time is None else options.sample_time
-        latency = cameras.latency if options.latency is None else options.latency
-        with compilation_announced():
-            note("linearising the loop")
-            sampling = None if options.continuous else period
-            gain, chosen = options.gain, None
-            if gain is None:
-                chosen = default_gain(robot, pose, options.cable_model, sampling, latency)
-                gain = chosen.gain
-            loop = make_vision_based_control(
-                robot,
-                options.cable_model,
-                gain=gain,
-                sample_time=sampling,
-                latency=0.0 if options.continuous else latency,
-            )
-            at_rest = equilibrium(loop, pose)
-            if options.continuous:
-                found = modes(linearize(loop, at_rest, ["desired_pose"], ["pose_error"]))
-            else:
-                found = modes(one_period_map(loop, at_rest))
-    except (CdprError, ValueError) as error:
-        raise UsageError(str(error)) from error
+    with input_refused():
+        place = resolve_place(options)
+        period, latency = resolve_timing(options, place.robot)
+        print_message("linearising the loop ...")
+        sampling = None if options.continuous else period
+        gain, chosen = resolve_gain(options, place, sampling, latency)
+        found = _find_modes(place, options.cable_model, gain, sampling, latency)
     timing = "continuous" if options.continuous else f"{period:g} s, {1e3 * latency:g} ms late"
-    head = f"{in_words(robot, pose, where)}; {options.cable_model}, "
-    head += f"{gain_in_words(gain, chosen, 'there')}, {timing}."
+    head = f"{place}; {options.cable_model}, {gain_in_words(gain, chosen, 'there')}, {timing}."
     summary: dict[str, Any] = {
-        "robot": robot.name,
-        "mass_kg": robot.mass,
-        "pose_x_y_z_m_roll_pitch_yaw_deg": pose_values(pose),
+        **place.to_dict(),
         "cable_model": options.cable_model,
         **gain_values(gain, chosen),
         "sample_time_s": sampling,
@@ -78,16 +60,45 @@ def linearize_command(options: argparse.Namespace) -> int:
         "modes": named(found),
     }
 
-    def figures() -> dict[str, Any]:
-        from cdpr_drake.show import mode_shape_figure, pole_figure
-
-        drawn = {"poles": pole_figure({timing: found}, head)}
+    def figures(show: Any) -> dict[str, Any]:
+        drawn = {"poles": show.pole_figure({timing: found}, head)}
         if (swing := least_damped(found)) is not None:
-            drawn["mode_shape"] = mode_shape_figure(found, swing, robot, pose)
+            drawn["mode_shape"] = show.mode_shape_figure(found, swing, place.robot, place.pose)
         return drawn
 
     lines = [*wrapped(head), "", str(found), "", *wrapped(_verdict(found))]
-    return leave(options, f"linearize-{as_file_name(robot.name)}", summary, lines, figures)
+    return write_answer(options, f"linearize-{place.robot.name}", summary, lines, figures)
+
+
+COMMAND = Command(
+    summary="tell the modes of the control loop at a pose",
+    description="Linearise the whole vision-based control loop at rest at a pose, continuous or "
+    "sampled, and list its modes: eigenvalues, frequencies, damping, time constants, and the "
+    "states that take part. Draw the pole map, and the shape of the least damped oscillation.",
+    example="--test 4 --gain 0.1 --continuous",
+    add_arguments=_add_arguments,
+    work=_linearize,
+)
+
+
+def _find_modes(
+    place: Place, cable_model: str, gain: float, sample_time: float | None, latency: float
+) -> Modes:
+    """Return the modes of a loop, all continuous without a sample time."""
+    from cdpr_drake.diagrams import make_vision_based_control
+    from cdpr_drake.study import equilibrium, linearize, modes, one_period_map
+
+    loop = make_vision_based_control(
+        place.robot,
+        cable_model,
+        gain=gain,
+        sample_time=sample_time,
+        latency=0.0 if sample_time is None else latency,
+    )
+    at_rest = equilibrium(loop, place.pose, place.tensions)
+    if sample_time is None:
+        return modes(linearize(loop, at_rest, ["desired_pose"], ["pose_error"]))
+    return modes(one_period_map(loop, at_rest))
 
 
 def least_damped(found: Modes) -> Mode | None:

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from cdpr_drake.commands.answer import DOTS_PER_INCH
-from cdpr_drake.commands.arguments import UsageError
-from cdpr_drake.commands.files import staged, to_json
-from cdpr_drake.commands.terminal import CaseProgress, print_wrapped, say
-from cdpr_drake.errors import SweepError
-from cdpr_drake.experiments.reproduction.registry import reproductions
-from cdpr_drake.experiments.reproduction.reproduce import Reproduced, report_of, reproduce
-from cdpr_drake.experiments.reproduction.section import Reproduction
-from cdpr_drake.experiments.reproduction.words import count_of_claims, verdict, what_else
+from cdpr_drake.commands import Command, UsageError
+from cdpr_drake.commands.files import DOTS_PER_INCH, staged, to_json
+from cdpr_drake.commands.terminal import CaseProgress, print_message, print_wrapped
+
+if TYPE_CHECKING:
+    from cdpr_drake.experiments.reproduction.reproduce import Reproduced
+    from cdpr_drake.experiments.reproduction.section import Reproduction
 
 CASES = "cases"
 """Folder in the output's with what has been computed."""
@@ -25,19 +23,24 @@ CASES = "cases"
 INDENT = " " * len("  agrees  ")
 
 
-def reproduce_command(
-    options: argparse.Namespace, known: Mapping[str, Reproduction] | None = None
-) -> int:
-    """Carry out `cdpr-drake reproduce` and return the exit status.
+def _add_arguments(parser: ArgumentParser) -> None:
+    parser.add_argument("--only", nargs="+", action="extend", metavar="NAME",
+                        help="some of it, e.g. table4 figure13; an unknown name lists all "
+                        "(default: all)")  # fmt: skip
+    parser.add_argument("--jobs", type=_count, metavar="N",
+                        help="processes (default: as many as cores)")  # fmt: skip
+    parser.add_argument("--output", type=Path, metavar="DIR",
+                        help="where report.html, report.json and figures go (default: "
+                        "out/reproduction)")  # fmt: skip
+    parser.add_argument("--json", action="store_true", help="print report.json, nothing else")
 
-    Args:
-        options: the parsed arguments.
-        known: what can be made again, by name; the paper's tables and figures if None.
 
-    Raises:
-        UsageError: the input cannot be used; nothing was run or written.
-    """
-    wanted = _wanted(options.only, reproductions() if known is None else known)
+def _reproduce(options: Namespace) -> int:
+    from cdpr_drake.errors import SweepError
+    from cdpr_drake.experiments.reproduction.registry import reproductions
+    from cdpr_drake.experiments.reproduction.reproduce import report_of, reproduce
+
+    wanted = _wanted(options.only, reproductions())
     directory = options.output or Path("out") / "reproduction"
     progress = CaseProgress()
     try:
@@ -45,12 +48,14 @@ def reproduce_command(
         found, cpu_time = reproduce(wanted, directory / CASES, jobs=options.jobs, progress=progress)
     except KeyboardInterrupt:
         progress.done()
-        say(f"interrupted; what is done is in {directory}, and the same command goes on from there")
+        print_message(
+            f"interrupted; what is done is in {directory}, and the same command goes on from there"
+        )
         return 130
     except OSError as error:
         raise UsageError(f"--output {directory}: {error.strerror or error}") from error
     except SweepError as error:
-        say(f"error: {error}")
+        print_message(f"error: {error}")
         return 1
     progress.done()
     report = report_of(found, cpu_time)
@@ -65,6 +70,30 @@ def reproduce_command(
         _print(report)
         print_wrapped(f"In {directory}: {', '.join(files)}", indent="    ")
     return 1 if any(part.errors for part in found) else 0
+
+
+COMMAND = Command(
+    summary="make the paper's tables and figures again, with what it prints beside",
+    description="Run the experiments and simulations of Dallej et al. 2019, Tables 4 to 7 and "
+    "Figures 10 to 16, and write a report: each of the paper's numbers and claims beside ours. "
+    "What an earlier, even an interrupted, run of the same source has computed is not computed "
+    "again.",
+    example="--only table4 figure13",
+    add_arguments=_add_arguments,
+    work=_reproduce,
+    exit_status="0, done, whether or not all claims agree; 1, a case failed; 2, the input cannot "
+    "be used; 130, interrupted: the same command goes on from there.",
+)
+
+
+def _count(text: str) -> int:
+    try:
+        number = int(text)
+    except ValueError:
+        number = 0
+    if number < 1:
+        raise ArgumentTypeError(f"{text!r} is no number of processes")
+    return number
 
 
 def _wanted(
@@ -95,6 +124,8 @@ def _write(folder: Path, report: dict[str, Any], found: Sequence[Reproduced]) ->
 
 def _print(report: Mapping[str, Any]) -> None:
     """Print a summary: each claim, the paper's number and ours, and what it could have been."""
+    from cdpr_drake.experiments.reproduction.words import count_of_claims, verdict, what_else
+
     for section in report["sections"]:
         print()
         print_wrapped(section["title"])

@@ -5,13 +5,24 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from importlib.metadata import version
-from typing import Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from cdpr_drake import __version__
+from cdpr_drake.commands.resolve import pose_values
 from cdpr_drake.commands.terminal import Column, fitting, print_wrapped, table, width_of
-from cdpr_drake.experiments import Run, Setup
+
+if TYPE_CHECKING:
+    from cdpr_drake.experiments import Run, Setup
+
+UNITS = {
+    "position_error": "mm",
+    "orientation_error": "deg",
+    "settled_after": "s",
+    "position_excursion": "mm",
+    "orientation_excursion": "deg",
+    "lowest_tension": "N",
+    "highest_tension": "N",
+}
 
 
 def summarize(name: str, setup: Setup, runs: Sequence[Run]) -> dict[str, Any]:
@@ -22,11 +33,6 @@ def summarize(name: str, setup: Setup, runs: Sequence[Run]) -> dict[str, Any]:
         setup: of one of the runs.
         runs: all of them.
     """
-
-    def pose(X: Any) -> list[float]:
-        angles = np.degrees(X.rotation().ToRollPitchYaw().vector())
-        return [*X.translation().tolist(), *angles.tolist()]
-
     return {
         "name": name,
         "cdpr_drake": __version__,
@@ -34,24 +40,20 @@ def summarize(name: str, setup: Setup, runs: Sequence[Run]) -> dict[str, Any]:
         "robot": setup.robot.name,
         "mass_kg": setup.robot.mass,
         "payload_kg": setup.robot.payload.mass,
-        "start_x_y_z_m_roll_pitch_yaw_deg": pose(setup.start),
-        "goal_x_y_z_m_roll_pitch_yaw_deg": pose(setup.goal),
+        "start_x_y_z_m_roll_pitch_yaw_deg": pose_values(setup.start),
+        "goal_x_y_z_m_roll_pitch_yaw_deg": pose_values(setup.goal),
+        "tensions": setup.tensions,
         "gain_per_s": setup.gain,
         "sample_time_s": setup.sample_time,
         "latency_s": setup.latency,
         "calibrated": setup.calibrated is not None,
-        "noise": setup.noise,
-        "sensors": setup.sensors,
-        "estimator": setup.estimator,
-        "seed": setup.seed,
-        "runs": {r.setup.label: _outcome(r) for r in runs},
+        **{name: getattr(setup, name) for name in ("noise", "sensors", "estimator", "seed")},
+        "runs": {r.setup.label: {**_law(r.setup), **r.summary.to_dict()} for r in runs},
     }
 
 
-def _outcome(result: Run) -> dict[str, Any]:
-    setup = result.setup
-    head = {"controller": setup.controller, "cable_model": setup.cable_model}
-    return {**head, **result.summary.to_dict()}
+def _law(setup: Setup) -> dict[str, str]:
+    return {"controller": setup.controller, "cable_model": setup.cable_model}
 
 
 def print_results(runs: Sequence[Run]) -> None:
@@ -90,37 +92,22 @@ def _columns(runs: Sequence[Run]) -> list[Column]:
         values = [getattr(summary, attribute) for summary in results]
         return ["-" if value is None else f"{value:.{digits}f}" for value in values]
 
+    # fmt: off
     return [
-        Column(heading=("", "run"), cells=[r.setup.label for r in runs], to_the_left=True),
-        Column(
-            heading=("final", "mm"),
-            cells=cells("position_error", 1),
-            meaning="Final error: true pose against the goal, mean of the last second.",
-        ),
-        Column(heading=("error", "deg"), cells=cells("orientation_error", 3)),
-        Column(
-            heading=("seen", "mm"),
-            cells=cells("position_error_seen", 1),
-            rank=4,
-            meaning="Seen: the same as the controller measures it.",
-        ),
-        Column(heading=("", "deg"), cells=cells("orientation_error_seen", 3), rank=5),
-        Column(
-            heading=("to 2 %", "s"),
-            cells=cells("settled_after", 1),
-            meaning="To 2 %: from then on the position error is below 2 % of the first.",
-        ),
-        Column(
-            heading=("strays", "mm"),
-            cells=cells("position_excursion", 1),
-            rank=1,
-            meaning="Strays: farthest from the straight way to the goal.",
-        ),
-        Column(heading=("", "deg"), cells=cells("orientation_excursion", 2), rank=3),
-        Column(
-            heading=("tension", "N"),
-            cells=[f"{s.lowest_tension:.0f}-{s.highest_tension:.0f}" for s in results],
-            rank=2,
-            meaning="Tension: lowest and highest at the drawing points.",
-        ),
+        Column(("", "run"), [r.setup.label for r in runs], to_the_left=True),
+        Column(("final", "mm"), cells("position_error", 1),
+               meaning="Final error: true pose against the goal, mean of the last second."),
+        Column(("error", "deg"), cells("orientation_error", 3)),
+        Column(("seen", "mm"), cells("position_error_seen", 1), rank=4,
+               meaning="Seen: the same as the controller measures it."),
+        Column(("", "deg"), cells("orientation_error_seen", 3), rank=5),
+        Column(("to 2 %", "s"), cells("settled_after", 1),
+               meaning="To 2 %: from then on the position error is below 2 % of the first."),
+        Column(("strays", "mm"), cells("position_excursion", 1), rank=1,
+               meaning="Strays: farthest from the straight way to the goal."),
+        Column(("", "deg"), cells("orientation_excursion", 2), rank=3),
+        Column(("tension", "N"),
+               [f"{s.lowest_tension:.0f}-{s.highest_tension:.0f}" for s in results], rank=2,
+               meaning="Tension: lowest and highest at the drawing points."),
     ]
+    # fmt: on

@@ -2,40 +2,95 @@
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import logging
+import math
+import re
+from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from cdpr_drake.commands.arguments import UsageError
-from cdpr_drake.commands.files import SUMMARY, staged, to_json, write_log, write_summary
-from cdpr_drake.commands.gain import gain_values
-from cdpr_drake.commands.kernels import compilation_announced
-from cdpr_drake.commands.plan import describe, plan, warn_of_low_tensions
+from cdpr_drake.commands import Command, UsageError
+from cdpr_drake.commands import arguments as common
+from cdpr_drake.commands.files import SUMMARY, as_file_name, staged, to_json, write_log
+from cdpr_drake.commands.resolve import (
+    Move,
+    gain_in_words,
+    gain_values,
+    input_refused,
+    resolve_move,
+)
 from cdpr_drake.commands.results import print_results, summarize
-from cdpr_drake.commands.terminal import Progress, print_wrapped, say
-from cdpr_drake.errors import CdprError
-from cdpr_drake.experiments import Prepared, Run, prepare, run
+from cdpr_drake.commands.terminal import Progress, print_message, print_wrapped
+
+if TYPE_CHECKING:
+    from cdpr_drake.experiments import Prepared, Run, Setup
+    from cdpr_drake.model.robot import CableRobot
+    from cdpr_drake.study import DefaultGain
+
+DEFAULT_MODELS = ("SCMWE", "SLSM")
 
 
-def run_command(options: argparse.Namespace) -> int:
-    """Carry out `cdpr-drake run` and return the exit status.
+def _add_arguments(parser: ArgumentParser) -> None:
+    what = parser.add_argument_group("what moves, and where")
+    what.add_argument("--test", type=int, metavar="N",
+                      help="one of the paper's Tests 1 to 5: poses, payload, gain, time (default: "
+                      "4 for CoGiRo, a short move near its middle for another robot)")  # fmt: skip
+    what.add_argument("--robot", **common.ROBOT)
+    what.add_argument("--payload", **common.PAYLOAD)
+    for name, text in (("from", "start"), ("to", "goal")):
+        what.add_argument(f"--{name}", dest=text, **common.POSE,
+                          help=f"the platform's {text}: position [m]; roll, pitch, yaw [deg], "
+                          "level if left out (default: the test's, or of the short "
+                          "move)")  # fmt: skip
+    what.add_argument("--tensions", **common.TENSIONS)
+    what.add_argument("--until", type=float, metavar="S",
+                      help="time to run (default: the test's, or 80; eight time constants of a "
+                      "gain that robot file or limit decide, at most 400)")  # fmt: skip
+    how = parser.add_argument_group("how it is controlled")
+    how.add_argument("--controller", choices=("vbc", "jsc", "both"), default="both",
+                     help="vision-based, joint space control, or both (default: both)")  # fmt: skip
+    how.add_argument("--cable-model", **common.CABLE_MODELS,
+                     help=f"of VBC: {common.MODELS}; one run each (default: "
+                     f"{','.join(DEFAULT_MODELS)})")  # fmt: skip
+    how.add_argument("--gain", type=float, metavar="PER_S",
+                     help="lambda [1/s] (default: that of --test; else the robot file's; else 0.1, "
+                     "or half the limit at the goal if that is less)")  # fmt: skip
+    how.add_argument("--sample-time", type=float, metavar="S",
+                     help="of the vision loop; 0: all continuous, no latency (default: the "
+                     "robot's)")  # fmt: skip
+    how.add_argument("--latency", **common.LATENCY)
+    _add_sensing(parser.add_argument_group("what the controllers see and believe"))
+    out = common.add_output(parser)
+    out.add_argument("--no-replay", action="store_true", help="write no replay")
 
-    Args:
-        options: the parsed arguments.
 
-    Raises:
-        UsageError: the input cannot be used; nothing was run or written.
-    """
-    try:
-        with compilation_announced():
-            name, setups, chosen = plan(options)
-            ready = [prepare(setup) for setup in setups]
-    except (CdprError, ValueError) as error:
-        raise UsageError(str(error)) from error
-    warn_of_low_tensions(ready)
+def _add_sensing(what: Any) -> None:
+    what.add_argument("--sensors", default="gaussian", metavar="KIND",
+                      help="what VBC's cameras deliver: gaussian, the truth with noise; targets, a "
+                      "pose from the patterns' points and tangents from the cables' edges; images, "
+                      "the same detected in rendered images, which is slow (default: "
+                      "gaussian)")  # fmt: skip
+    what.add_argument("--estimator", default="joint", metavar="KIND",
+                      help="of the pose from targets: joint, over all images; mean, the paper's "
+                      "(default: joint)")  # fmt: skip
+    what.add_argument("--calibrated", metavar="NAME|FILE",
+                      help="the robot as the controllers believe it, as `calibrate` writes it; "
+                      "start and goal are the true robot's, in W (default: the true "
+                      "robot)")  # fmt: skip
+    what.add_argument("--no-noise", **common.NO_NOISE)
+    what.add_argument("--seed", **common.SEED)
+
+
+def _run(options: Namespace) -> int:
+    from cdpr_drake.errors import CdprError
+    from cdpr_drake.experiments import prepare
+
+    with input_refused():
+        name, setups, chosen = plan(options)
+        ready = [prepare(setup) for setup in setups]
+    _warn_of_low_tensions(ready)
     directory = options.output or Path("out") / name
     if not options.json:
         print_wrapped(describe(name, setups[0], chosen))
@@ -45,16 +100,16 @@ def run_command(options: argparse.Namespace) -> int:
                 folder = stack.enter_context(staged(directory))
             except OSError as error:
                 raise UsageError(f"--output {directory}: {error.strerror or error}") from error
-            runs = carry_out(ready)
+            runs = _carry_out(ready)
             summary = summarize(name, setups[0], runs)
             asked = "option" if options.gain is not None else "test"
             summary |= gain_values(setups[0].gain, chosen, asked)
-            write_all(folder, summary, runs, options)
+            _write_all(folder, summary, runs, options)
     except CdprError as error:
-        say(f"error: {error}; nothing written")
+        print_message(f"error: {error}; nothing written")
         return 1
     except OSError as error:
-        say(f"error: {directory}: {error.strerror or error}")
+        print_message(f"error: {directory}: {error.strerror or error}")
         return 1
     if options.json:
         print(to_json(summary))
@@ -64,15 +119,175 @@ def run_command(options: argparse.Namespace) -> int:
     return 0
 
 
-def carry_out(ready: Sequence[Prepared]) -> list[Run]:
-    """Return the runs, with their progress on stderr.
+COMMAND = Command(
+    summary="move a robot from one pose to another under one or more controllers",
+    description="Move a robot from one pose to another under vision-based control (VBC) with one "
+    "or more cable models, and under joint space control (JSC); compare the runs, and write logs, "
+    "a summary, figures and a replay. Without options: Test 4 of Dallej et al. 2019 on CoGiRo, "
+    "with VBC on sagging (SCMWE) and on straight cables (SLSM), and with JSC.",
+    example="--robot cogiro-22m --payload 50 --cable-model ECM,SLSM",
+    add_arguments=_add_arguments,
+    work=_run,
+)
+
+
+class Plan(NamedTuple):
+    """What the options ask for.
+
+    Attributes:
+        name: of it.
+        setups: of its runs.
+        chosen: why their gain is what it is, if neither --gain nor --test says it; else None.
+    """
+
+    name: str
+    setups: list[Setup]
+    chosen: DefaultGain | None
+
+
+def plan(options: Namespace) -> Plan:
+    """Return a name for what the options ask for, and the setups of its runs.
+
+    The runs have one gain: that of --gain, or of the test asked for by --test. Else it is the
+    robot's: of its file, or `default_gain` at the goal, the lowest of the laws compared.
 
     Args:
-        ready: what `prepare` made.
+        options: the parsed arguments.
 
     Raises:
-        CableError, SimulationError: a run left what the model covers.
+        CdprError, ValueError: they cannot be used.
     """
+    from cdpr_drake.experiments import Setup
+    from cdpr_drake.model.cable_models import CABLE_MODELS
+    from cdpr_drake.study import lowest_gain
+
+    move = resolve_move(options)
+    values = _values(options, move)
+    setups = []
+    if options.controller in ("vbc", "both"):
+        models = dict.fromkeys(options.cable_model or DEFAULT_MODELS)
+        setups += [Setup(cable_model=m, **values) for m in models]
+    elif options.cable_model:
+        known = ", ".join(CABLE_MODELS)
+        raise ValueError(f"--cable-model ({known}) is VBC's; it has no meaning with JSC alone")
+    if options.controller in ("jsc", "both"):
+        setups.append(Setup(controller="JSC", **values))
+    chosen = lowest_gain(s.chosen for s in setups if s.chosen) if "gain" not in values else None
+    if chosen is not None:
+        setups = [_at_gain(s, chosen, options.until) for s in setups]
+    is_test = move.number is not None and options.start is None and options.goal is None
+    name = f"test-{move.number}" if is_test else as_file_name(move.robot.name)
+    # Runs that see, believe or pull otherwise do not replace the plain one's results.
+    seen = "" if options.sensors == Setup.sensors else f"-{options.sensors}"
+    believed = "" if options.calibrated is None else "-calibrated"
+    pulled = "" if options.tensions == common.DEFAULT_RULE else f"-{as_file_name(options.tensions)}"
+    return Plan(f"{name}{seen}{believed}{pulled}", setups, chosen)
+
+
+def _values(options: Namespace, move: Move) -> dict[str, Any]:
+    """Return what the setups of all runs have in common."""
+    values: dict[str, Any] = {
+        "robot": move.robot,
+        "start": move.start,
+        "goal": move.goal,
+        "tensions": move.tensions,
+        "sample_time": move.robot.cameras.sample_time,
+        "latency": move.robot.cameras.latency,
+        "noise": not options.no_noise,
+        "seed": options.seed,
+        "sensors": options.sensors,
+        "estimator": options.estimator,
+    }
+    if move.test is not None:
+        values["until"] = move.test.duration
+        if options.test is not None:
+            values["gain"] = move.test.gain
+    for field in ("gain", "latency", "sample_time", "until"):
+        given = getattr(options, field)
+        if given is not None:
+            values[field] = given
+    if values["sample_time"] == 0.0:
+        values["sample_time"] = None
+    if options.calibrated is not None:
+        values["calibrated"] = _believed(options.calibrated, move.robot)
+    return values
+
+
+def _at_gain(setup: Setup, chosen: DefaultGain, until: float | None) -> Setup:
+    """Return a setup with the gain of all, and the time that it takes unless that was asked for."""
+    from cdpr_drake.experiments.moves import time_for
+
+    if chosen.decided_by == "custom":
+        return setup
+    return setup.replace(gain=chosen.gain, until=time_for(chosen.gain) if until is None else until)
+
+
+def _believed(name: str, robot: CableRobot) -> CableRobot:
+    """Return the robot as the controllers believe it, with what the true robot carries."""
+    from cdpr_drake.model.robot import load_robot
+
+    believed = load_robot(name)
+    if believed.num_cables != robot.num_cables:
+        cables = f"{believed.num_cables} cables, the true robot {robot.num_cables}"
+        raise ValueError(f"--calibrated {name}: has {cables}")
+    return believed.replace(payload=robot.payload)
+
+
+def _warn_of_low_tensions(ready: Sequence[Prepared]) -> None:
+    """Warn on stderr of runs that start with a cable below the robot's lower tension limit."""
+    said: dict[str, list[str]] = {}
+    for prepared in ready:
+        tension = prepared.tension_at_drawing_point()
+        cable = int(tension.argmin())
+        limit = prepared.setup.robot.cable.min_tension
+        if tension[cable] < limit:
+            text = (
+                f"with cable {cable + 1} at {tension[cable]:.0f} N, below the robot's {limit:g} N"
+            )
+            said.setdefault(text, []).append(prepared.setup.label)
+    for text, labels in said.items():
+        print_message(f"warning: {', '.join(labels)}: starts {text}")
+
+
+def describe(name: str, setup: Setup, chosen: DefaultGain | None = None) -> str:
+    """Return in words what the runs have in common.
+
+    Args:
+        name: of what is run.
+        setup: of one of the runs.
+        chosen: why their gain is what it is, if nobody asked for one.
+    """
+    from cdpr_drake.experiments.moves import DECAYS, LONGEST
+    from cdpr_drake.model.servo import pose_error
+
+    s = pose_error(setup.start, setup.goal, setup.robot.cameras.X_PM)
+    turn, way = math.degrees(math.hypot(*s[:3])), math.hypot(*s[3:])
+    test = re.match(r"test-(\d+)", name)
+    what = f"Test {test[1]} of the paper" if test else "A move"
+    loop = "a continuous loop"
+    if setup.sample_time is not None:
+        loop = f"{1.0 / setup.sample_time:g} Hz with {1e3 * setup.latency:g} ms of latency"
+    noise = f"noise with seed {setup.seed}" if setup.noise else "no noise"
+    if setup.sensors != "gaussian":
+        noise = f"sensors: {setup.sensors} ({setup.estimator} estimate), {noise}"
+    if setup.tensions != common.DEFAULT_RULE:
+        noise = f"tensions {setup.tensions}, {noise}"
+    if setup.calibrated is not None:
+        noise = f"a calibrated robot believed, {noise}"
+    gain, rest = gain_in_words(setup.gain, chosen), ""
+    decays = setup.gain * setup.until
+    if chosen is not None and setup.until == LONGEST and decays < DECAYS:
+        rest = f" It ends after {decays:.2g} of the gain's time constants; --until lets it go on."
+    return (
+        f"{what} on {setup.robot.name}, {setup.robot.mass:g} kg: {way:.2f} m and {turn:.1f} deg in "
+        f"{setup.until:g} s, {gain}, {loop}, {noise}.{rest}"
+    )
+
+
+def _carry_out(ready: Sequence[Prepared]) -> list[Run]:
+    """Return the runs, with their progress on stderr."""
+    from cdpr_drake.experiments import run
+
     label_width = max(len(p.setup.label) for p in ready)
     runs = []
     for prepared in ready:
@@ -87,20 +302,10 @@ def carry_out(ready: Sequence[Prepared]) -> list[Run]:
     return runs
 
 
-def write_all(
-    folder: Path, summary: dict[str, Any], runs: Sequence[Run], options: argparse.Namespace
+def _write_all(
+    folder: Path, summary: dict[str, Any], runs: Sequence[Run], options: Namespace
 ) -> None:
-    """Write logs, figures, replay and summary, and list the files in the summary.
-
-    Args:
-        folder: where to.
-        summary: as `summarize` gives it; gains "files".
-        runs: the runs.
-        options: the parsed arguments.
-
-    Raises:
-        OSError: a file cannot be written.
-    """
+    """Write logs, figures, replay and summary, and list the files in the summary."""
     first = runs[0].setup
     records = {r.setup.label: r.record for r in runs}
     for label, record in records.items():
@@ -123,4 +328,4 @@ def write_all(
             title=label,
         )
     summary["files"] = [SUMMARY, *sorted(file.name for file in folder.iterdir())]
-    write_summary(folder / SUMMARY, summary)
+    (folder / SUMMARY).write_text(f"{to_json(summary)}\n", encoding="utf-8")

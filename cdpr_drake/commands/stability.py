@@ -2,94 +2,104 @@
 
 from __future__ import annotations
 
-import argparse
 import math
-from typing import Any
+from argparse import ArgumentParser, Namespace
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
+from cdpr_drake.commands import Command
+from cdpr_drake.commands import arguments as common
+from cdpr_drake.commands.files import write_answer
+from cdpr_drake.commands.resolve import Place, input_refused, resolve_place, resolve_timing
+from cdpr_drake.commands.terminal import counted, wrapped
 
-from cdpr_drake.commands.answer import counted, leave, wrapped
-from cdpr_drake.commands.arguments import UsageError
-from cdpr_drake.commands.kernels import compilation_announced
-from cdpr_drake.commands.place import as_file_name, in_words, place, pose_values
-from cdpr_drake.errors import CdprError
-from cdpr_drake.study import (
-    GainBand,
-    GainLimit,
-    StabilityMap,
-    gain_limit,
-    gain_limit_band,
-    stability_map,
-)
+if TYPE_CHECKING:
+    from cdpr_drake.study import GainLimit, StabilityMap
 
 
-def stability_command(options: argparse.Namespace) -> int:
-    """Carry out `cdpr-drake stability` and return the exit status.
+def _add_arguments(parser: ArgumentParser) -> None:
+    common.add_place(parser).add_argument("--tensions", **common.TENSIONS)
+    parser.add_argument_group("the cables").add_argument(
+        "--damping-time", type=float, metavar="S",
+        help="damping of the cables over their stiffness (default: the robot's)",
+    )  # fmt: skip
+    how = parser.add_argument_group("how it is controlled")
+    how.add_argument("--cable-model", **common.CABLE_MODEL)
+    how.add_argument("--sample-time", **common.SAMPLE_TIME)
+    how.add_argument("--latency", **common.LATENCY)
+    over = parser.add_argument_group("the map")
+    over.add_argument("--map", action="store_true", help="map stability, with a figure")
+    over.add_argument("--gains", **common.SPAN, default=(0.1, 15.0, 24),
+                      help="of the map [1/s] (default: 0.1,15,24)")  # fmt: skip
+    over.add_argument("--latencies", **common.SPAN, default=(0.0, 0.24, 17),
+                      help="of the map [s] (default: 0,0.24,17)")  # fmt: skip
+    common.add_output(parser)
 
-    Args:
-        options: the parsed arguments.
 
-    Raises:
-        UsageError: the input cannot be used; nothing was written.
-    """
-    try:
-        robot, pose, where = place(options)
+def _find_limit(options: Namespace) -> int:
+    from cdpr_drake.study import gain_limit, gain_limit_band
+
+    with input_refused():
+        place = resolve_place(options)
+        robot = place.robot
         if options.damping_time is not None:
-            cable = robot.cable.replace(damping_time=options.damping_time)
-            robot = robot.replace(cable=cable)
-        cameras = robot.cameras
-        period = cameras.sample_time if options.sample_time is None else options.sample_time
-        latency = cameras.latency if options.latency is None else options.latency
-        law = {"cable_model": options.cable_model}
-        with compilation_announced():
-            limit = gain_limit(robot, pose, latency, period, **law)
-            band = gain_limit_band(robot, pose, latency, period, **law)
-            found = _map(options, robot, pose, period, law) if options.map else None
-    except (CdprError, ValueError) as error:
-        raise UsageError(str(error)) from error
-    head = f"{in_words(robot, pose, where)}; {options.cable_model}, {period:g} s, "
+            robot = robot.replace(cable=robot.cable.replace(damping_time=options.damping_time))
+            place = place._replace(robot=robot)
+        period, latency = resolve_timing(options, robot)
+        law = {"cable_model": options.cable_model, "tensions": place.tensions}
+        limit = gain_limit(robot, place.pose, latency, period, **law)
+        band = gain_limit_band(robot, place.pose, latency, period, **law)
+        found = _map(options, place, period, law) if options.map else None
+    head = f"{place}; {options.cable_model}, {period:g} s, "
     head += f"{1e3 * latency:g} ms late, damping time {1e3 * robot.cable.damping_time:g} ms."
     summary: dict[str, Any] = {
-        "robot": robot.name,
-        "mass_kg": robot.mass,
-        "pose_x_y_z_m_roll_pitch_yaw_deg": pose_values(pose),
+        **place.to_dict(),
         "cable_model": options.cable_model,
         "damping_time_s": robot.cable.damping_time,
         "sample_time_s": period,
         "latency_s": latency,
         **_limit(limit),
-        "band": _band(band),
+        "band": {
+            "loss_factors": list(band.loss_factors),
+            "damping_times_s": list(band.damping_times),
+            "limits": [_limit(limit) for limit in band.limits],
+        },
     }
-    lines = [*wrapped(head), "", *wrapped(_sentence(limit)), *wrapped(_band_sentence(band))]
+    text = str(limit)
+    lines = [*wrapped(head), "", *wrapped(f"{text[0].upper()}{text[1:]}.")]
+    lines += wrapped(f"The damping of the cables is not known: {band}.")
     if found is not None:
-        summary["map"] = {
-            "gains_per_s": found.gains.tolist(),
-            "latencies_s": found.latencies.tolist(),
-            "growth_per_s": found.growth.tolist(),
-            "frequency_hz": found.frequency.tolist(),
-            "limits": [_limit(x) for x in found.limits],
-        }
+        summary["map"] = _map_values(found)
         lines += ["", *_table(found)]
 
-    def figures() -> dict[str, Any]:
-        from cdpr_drake.show import stability_figure
+    def figures(show: Any) -> dict[str, Any]:
+        return {} if found is None else {"stability": show.stability_figure(found, title=head)}
 
-        return {} if found is None else {"stability": stability_figure(found, title=head)}
-
-    return leave(options, f"stability-{as_file_name(robot.name)}", summary, lines, figures)
+    return write_answer(options, f"stability-{robot.name}", summary, lines, figures)
 
 
-def _map(
-    options: argparse.Namespace, robot: Any, pose: Any, period: float, law: dict[str, Any]
-) -> StabilityMap:
+COMMAND = Command(
+    summary="tell how far the gain can go at a pose",
+    description="Find the smallest gain at which the sampled vision-based control loop is unstable "
+    "at a pose, and the mode that is; with --map over gain and latency.",
+    example="--test 4 --payload 200 --map",
+    add_arguments=_add_arguments,
+    work=_find_limit,
+)
+
+
+def _map(options: Namespace, place: Place, period: float, law: dict[str, Any]) -> StabilityMap:
     """Return the map, a latency at a time, with the count of them on stderr."""
+    import numpy as np
+
+    from cdpr_drake.study import StabilityMap, stability_map
+
     low, high, count = options.gains
     if low <= 0.0:
         raise ValueError(f"--gains: the lowest must be positive, got {low:g}/s")
     gains = np.geomspace(low, high, count)
     latencies = np.linspace(*options.latencies)
     rows = [
-        stability_map(robot, pose, gains, [latency], period, **law)
+        stability_map(place.robot, place.pose, gains, [latency], period, **law)
         for latency in counted(list(latencies), "latencies")
     ]
     return StabilityMap(
@@ -101,6 +111,16 @@ def _map(
     )
 
 
+def _map_values(found: StabilityMap) -> dict[str, Any]:
+    return {
+        "gains_per_s": found.gains.tolist(),
+        "latencies_s": found.latencies.tolist(),
+        "growth_per_s": found.growth.tolist(),
+        "frequency_hz": found.frequency.tolist(),
+        "limits": [_limit(limit) for limit in found.limits],
+    }
+
+
 def _limit(limit: GainLimit) -> dict[str, Any]:
     """Return a limit as plain values; what is infinite or unknown as None."""
     return {
@@ -110,24 +130,6 @@ def _limit(limit: GainLimit) -> dict[str, Any]:
         "unstable_gains_per_s": [list(span) for span in limit.unstable],
         "searched_up_to_per_s": limit.searched,
     }
-
-
-def _band(band: GainBand) -> dict[str, Any]:
-    """Return a band as plain values."""
-    return {
-        "loss_factors": list(band.loss_factors),
-        "damping_times_s": list(band.damping_times),
-        "limits": [_limit(limit) for limit in band.limits],
-    }
-
-
-def _band_sentence(band: GainBand) -> str:
-    return f"The damping of the cables is not known: {band}."
-
-
-def _sentence(limit: GainLimit) -> str:
-    text = str(limit)
-    return f"{text[0].upper()}{text[1:]}."
 
 
 def _table(found: StabilityMap) -> list[str]:

@@ -9,25 +9,20 @@ import textwrap
 import time
 import warnings
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any, TextIO
+from dataclasses import KW_ONLY, dataclass
+from typing import Any, TextIO, TypeVar
 
-from cdpr_drake.model.robot import RobotFileWarning
-from cdpr_drake.study.stability import StabilityWarning
-from cdpr_drake.study.step_size import StepWarning
+T = TypeVar("T")
 
-NAME = "cdpr-drake"
-
-OURS = (RobotFileWarning, StabilityWarning, StepWarning)
-"""Warnings that are for the user of the command line."""
+PROGRAM = "cdpr-drake"
 
 REDRAW_PERIOD = 0.1
 """Shortest time between two drawings of a progress bar [s]."""
 
 
-def say(message: str) -> None:
-    """Write a `message` on one line of stderr, after the name of the program."""
-    print(f"{NAME}: {' '.join(message.split())}", file=sys.stderr, flush=True)
+def print_message(message: str) -> None:
+    """Print a `message` on one line of stderr, after the name of the program."""
+    print(f"{PROGRAM}: {' '.join(message.split())}", file=sys.stderr, flush=True)
 
 
 def width_of(stream: TextIO) -> int:
@@ -41,32 +36,46 @@ def width_of(stream: TextIO) -> int:
 
 
 def print_wrapped(text: str, indent: str = "") -> None:
-    """Print a paragraph on stdout, no wider than the screen.
+    """Print a `text` on stdout, no wider than the screen, lines but the first after an `indent`."""
+    print(paragraph(text, indent), flush=True)
 
-    Args:
-        text: the paragraph.
-        indent: of all its lines but the first.
-    """
+
+def paragraph(text: str, indent: str = "") -> str:
+    """Return a `text` in lines no wider than the screen, all but the first after an `indent`."""
+    return "\n".join(wrapped(text, indent))
+
+
+def wrapped(text: str, indent: str = "") -> list[str]:
+    """Return the lines of `paragraph` for a `text` and an `indent`."""
     width = max(width_of(sys.stdout), 20)
-    lines = textwrap.wrap(text, width, subsequent_indent=indent, break_on_hyphens=False)
-    print("\n".join(lines), flush=True)
+    return textwrap.wrap(text, width, subsequent_indent=indent, break_on_hyphens=False)
+
+
+def fitted_table(columns: Sequence[Column]) -> str:
+    """Return a table of those of the `columns` that fit the screen, as text."""
+    return table(fitting(columns, width_of(sys.stdout)))
 
 
 @contextlib.contextmanager
 def warnings_on_one_line() -> Iterator[None]:
-    """Write this package's warnings on one line of stderr each, and each only once."""
+    """Print this package's warnings on one line of stderr each, and each only once."""
+    from cdpr_drake.model.robot import RobotFileWarning
+    from cdpr_drake.study.stability import StabilityWarning
+    from cdpr_drake.study.step_size import StepWarning
+
+    ours = (RobotFileWarning, StabilityWarning, StepWarning)
     seen: set[str] = set()
     with warnings.catch_warnings():
         others = warnings.showwarning
 
         def show(message: Any, category: Any, *args: Any, **kwargs: Any) -> None:
-            if not issubclass(category, OURS):
+            if not issubclass(category, ours):
                 others(message, category, *args, **kwargs)
             elif str(message) not in seen:
                 seen.add(str(message))
-                say(f"warning: {message}")
+                print_message(f"warning: {message}")
 
-        for category in OURS:
+        for category in ours:
             warnings.simplefilter("always", category)
         warnings.showwarning = show
         yield
@@ -83,50 +92,35 @@ class Progress:
 
     def __init__(self, label: str, until: float, label_width: int = 0) -> None:
         self._label, self._until = label.ljust(label_width), until
-        self._is_terminal = sys.stderr.isatty()
         self._drawn_at = -REDRAW_PERIOD
         self._begun = time.monotonic()
 
     def __call__(self, now: float) -> None:
         """Show that the run has come to the time `now` [s]."""
         clock = time.monotonic()
-        if not self._is_terminal or clock - self._drawn_at < REDRAW_PERIOD:
+        if not sys.stderr.isatty() or clock - self._drawn_at < REDRAW_PERIOD:
             return
         self._drawn_at = clock
         end = f"{self._until:g}"
         counter = f"{now:{len(end)}.0f} of {end} s"
-        room = width_of(sys.stderr) - 1 - len(self._label) - len(counter) - 6
-        bar = ""
-        if room >= 5:
-            done = min(int(room * now / self._until), room)
-            bar = f"[{'#' * done}{'.' * (room - done)}]  "
-        self._draw(f"{self._label}  {bar}{counter}")
+        bar = _bar(now / self._until, len(self._label) + len(counter) + 7)
+        _draw(f"{self._label}  {bar}{counter}")
 
     def done(self, factor: float) -> None:
         """Replace the bar by a last line, with how many times real time the run went: `factor`."""
         took = time.monotonic() - self._begun
-        line = f"{self._label}  {self._until:g} s in {took:.1f} s, {factor:.1f} x real time"
-        self._draw(line)
-        print(file=sys.stderr, flush=True)
+        _draw(f"{self._label}  {self._until:g} s in {took:.1f} s, {factor:.1f} x real time", "\n")
 
     def clear(self) -> None:
         """Take the bar away."""
-        if self._is_terminal:
-            self._draw("")
-            print(end="\r", file=sys.stderr, flush=True)
-
-    def _draw(self, line: str) -> None:
-        if self._is_terminal:
-            width = width_of(sys.stderr) - 1
-            line = f"\r{line[:width]:<{width}}"
-        print(line, end="", file=sys.stderr, flush=True)
+        if sys.stderr.isatty():
+            _draw("", "\r")
 
 
 class CaseProgress:
     """The progress of a sweep on stderr: a bar on a terminal, one line at the end elsewhere."""
 
     def __init__(self) -> None:
-        self._is_terminal = sys.stderr.isatty()
         self._begun = time.monotonic()
         self._resumed: int | None = None
         self._counts = (0, 0)
@@ -141,34 +135,56 @@ class CaseProgress:
         self._counts = (done, total)
         if self._resumed is None:
             self._resumed = done
-        if not self._is_terminal:
-            return
-        counter = f"{done:{len(str(total))}} of {total} cases  {self._took()}"
-        room = width_of(sys.stderr) - len(counter) - 6
-        bar = ""
-        if room >= 5 and total:
-            filled = room * done // total
-            bar = f"[{'#' * filled}{'.' * (room - filled)}]  "
-        self._draw(f"{bar}{counter}")
+        if sys.stderr.isatty():
+            counter = f"{done:{len(str(total))}} of {total} cases  {self._took()}"
+            _draw(f"{_bar(done / max(total, 1), len(counter) + 6)}{counter}")
 
     def done(self) -> None:
         """Replace the bar by a last line."""
         done, total = self._counts
         earlier = f", {self._resumed} of them earlier" if self._resumed else ""
-        self._draw(f"{done} of {total} cases{earlier}, in {self._took()}")
-        print(file=sys.stderr, flush=True)
+        _draw(f"{done} of {total} cases{earlier}, in {self._took()}", "\n")
 
     def _took(self) -> str:
         return f"{time.monotonic() - self._begun:.0f} s"
 
-    def _draw(self, line: str) -> None:
-        if self._is_terminal:
-            width = width_of(sys.stderr) - 1
-            line = f"\r{line[:width]:<{width}}"
-        print(line, end="", file=sys.stderr, flush=True)
+
+def counted(items: Sequence[T], what: str) -> Iterator[T]:
+    """Yield items with their count on stderr: rewritten on a terminal, one line at the end else.
+
+    Args:
+        items: the items.
+        what: they are, in the plural.
+    """
+    begun, drawn = time.monotonic(), -REDRAW_PERIOD
+    for i, item in enumerate(items):
+        now = time.monotonic()
+        if sys.stderr.isatty() and now - drawn >= REDRAW_PERIOD:
+            drawn = now
+            _draw(f"{i} of {len(items)} {what}")
+        yield item
+    took = time.monotonic() - begun
+    _draw(f"{len(items)} of {len(items)} {what} in {took:.1f} s", "\n")
 
 
-@dataclass(frozen=True, kw_only=True)
+def _bar(share: float, taken: int) -> str:
+    """Return a bar for what is left of the screen, "" if that is too little."""
+    room = width_of(sys.stderr) - taken
+    if room < 5:
+        return ""
+    done = min(int(room * share), room)
+    return f"[{'#' * done}{'.' * (room - done)}]  "
+
+
+def _draw(line: str, end: str = "") -> None:
+    """Write a line on stderr, on a terminal over the one before."""
+    if sys.stderr.isatty():
+        width = width_of(sys.stderr) - 1
+        line = f"\r{line[:width]:<{width}}"
+    print(line, end=end, file=sys.stderr, flush=True)
+
+
+@dataclass(frozen=True)
 class Column:
     """A column of a table.
 
@@ -182,6 +198,7 @@ class Column:
 
     heading: tuple[str, str]
     cells: Sequence[str]
+    _: KW_ONLY
     rank: int = 0
     to_the_left: bool = False
     meaning: str = ""
