@@ -66,7 +66,7 @@ def _find_limit(options: Namespace) -> int:
     }
     text = str(limit)
     lines = [*wrapped(head), "", *wrapped(f"{text[0].upper()}{text[1:]}.")]
-    lines += wrapped(f"The damping of the cables is not known: {band}.")
+    lines += wrapped(f"As damping is not known well, the limit may be {band}.")
     if found is not None:
         summary["map"] = _map_values(found)
         lines += ["", *_table(found)]

@@ -309,7 +309,7 @@ class GainBand:
         factors = f"{min(self.loss_factors):g} to {max(self.loss_factors):g}"
         times = f"{1e3 * min(self.damping_times):.2g} to {1e3 * max(self.damping_times):.2g} ms"
         gains = f"{self.lowest:.3g} to {self.highest:.3g}/s"
-        return f"{gains} for loss factors of {factors} (damping times of {times})"
+        return f"{gains} for loss factors of the cables of {factors} (damping times of {times})"
 
 
 def gain_limit_band(
