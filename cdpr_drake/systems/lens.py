@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from pydrake.common import RandomDistribution
-from pydrake.common.value import Value
-from pydrake.systems.framework import LeafSystem
+from pydrake.common.value import AbstractValue, Value
+from pydrake.systems.framework import Context, LeafSystem
 from pydrake.systems.sensors import ImageRgba8U
 
 from cdpr_drake.errors import GeometryError
@@ -56,7 +54,7 @@ class LensDistortion(LeafSystem):
             {self._image_port.ticket(), self._noise_port.ticket()},
         )
 
-    def _calc_image(self, context: Any, output: Any) -> None:
+    def _calc_image(self, context: Context, output: AbstractValue) -> None:
         image, pinhole = self._image_port.Eval(context), self.lens.pinhole
         if (image.width(), image.height()) != (pinhole.width, pinhole.height):
             raise GeometryError(

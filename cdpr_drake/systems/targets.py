@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from pydrake.common import RandomDistribution
 from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context
 
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import vector_to_pose
@@ -80,7 +79,7 @@ class TargetCameras(HeldPose):
             GAUSSIAN_INPUT, self._images.noise_size, RandomDistribution.kGaussian
         )
 
-    def measure(self, context: Any, prior: RigidTransform | None) -> PoseEstimate | None:
+    def measure(self, context: Context, prior: RigidTransform | None) -> PoseEstimate | None:
         """Return the pose that the points seen now give, or None; see `HeldPose`.
 
         Args:
@@ -89,7 +88,7 @@ class TargetCameras(HeldPose):
         """
         return self._estimate(self.see(context), prior)
 
-    def measure_at_rest(self, context: Any) -> PoseEstimate | None:
+    def measure_at_rest(self, context: Context) -> PoseEstimate | None:
         """Return the pose that all cameras show now without noise, or None.
 
         Args:
@@ -97,7 +96,7 @@ class TargetCameras(HeldPose):
         """
         return self._estimate(self._images(vector_to_pose(self._pose_port.Eval(context))))
 
-    def see(self, context: Any) -> Sightings:
+    def see(self, context: Context) -> Sightings:
         """Return what the cameras see now.
 
         Args:
