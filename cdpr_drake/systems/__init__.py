@@ -69,4 +69,5 @@ __all__ = [
     "ZeroWhenOpen",
     "ZeroWhenOpen_",
     "scalar_convertible",
+    "template_of",
 ]

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, ExtractValue, InitializeAutoDiff
+from pydrake.common import RandomDistribution
 from pydrake.systems.framework import (
     BasicVector,
     Context,
@@ -25,8 +26,6 @@ from pydrake.systems.scalar_conversion import TemplateSystem
 
 from cdpr_drake.errors import SimulationError
 
-GAUSSIAN_INPUT = "noise"
-
 C = TypeVar("C", bound=type)
 Calc = Callable[[Context, BasicVector], None]
 """What calculates a vector output port."""
@@ -38,6 +37,7 @@ def scalar_convertible(cls: C) -> C:
     The decorated class is the one for float; `ToAutoDiffXd`, `Linearize` and diagrams around it
     make it anew for AutoDiffXd with the arguments it was made with, which are kept, not copied.
     Its methods serve both: what they evaluate and calculate with are arrays of either scalar.
+    ::
 
         @scalar_convertible
         class Spring(LeafSystem):
@@ -50,8 +50,8 @@ def scalar_convertible(cls: C) -> C:
             def _calc_force(self, context: Context, output: BasicVector) -> None:
                 output.SetFromVector(-self._stiffness * self._stretch_port.Eval(context))
 
-    `isinstance(system, Spring)` holds in either scalar; `template_of(Spring)` is Drake's template,
-    as `LeafSystem_` is that of `LeafSystem`. A subclass needs the decorator again.
+    `isinstance(system, Spring)` holds for either scalar; `template_of(Spring)[AutoDiffXd]` is the
+    class for the other. A subclass needs the decorator again.
 
     Args:
         cls: a class derived from LeafSystem, or from one that is decorated.
@@ -82,30 +82,19 @@ def template_of(cls: type) -> Any:
 
 
 class _AnyScalar(type(LeafSystem)):  # type: ignore[misc]
-    """The type of converted classes, for which one in any scalar is an instance of each."""
+    """The type of decorated classes, each of which counts as one with those for other scalars."""
 
     def __instancecheck__(cls, instance: object) -> bool:
-        own = vars(cls).get("_template", cls)
-        return super().__instancecheck__(instance) or any(
+        if super().__instancecheck__(instance):
+            return True
+        own = vars(cls).get("_template")  # a subclass that is not decorated has none
+        return own is not None and any(
             vars(c).get("_template") is own for c in type(instance).__mro__
         )
 
 
 def _for_scalar(cls: type, T: type, template: Any) -> type:
-    """Return the class that `cls` is on top of `LeafSystem_[T]`, as Drake's template takes it."""
-
-    class Base(LeafSystem_[T]):
-        def __init__(self) -> None:
-            super().__init__(converter=self._made_with[2])
-
-    def in_scalar(base: type) -> type:
-        if base is LeafSystem:
-            return Base
-        if "_template" in vars(base):
-            return template_of(base)[T]
-        if issubclass(base, LeafSystem):
-            raise TypeError(f"{cls.__name__}: {base.__name__} is not @scalar_convertible")
-        return base
+    """Return `cls` derived from `LeafSystem_[T]`, as Drake's template takes it."""
 
     def construct(self: Any, *args: Any, converter: Any = None, **kwargs: Any) -> None:
         # A subclass has been here before, with its own.
@@ -120,16 +109,39 @@ def _for_scalar(cls: type, T: type, template: Any) -> type:
 
     this_class = CellType()
     members = {name: _rebound(member, this_class) for name, member in vars(cls).items()}
-    for name in ("__dict__", "__weakref__"):
+    for name in ("__dict__", "__weakref__"):  # descriptors, which each class gets for itself
         members.pop(name, None)
     own_init = members.pop("__init__", None)
     members |= {"_construct": construct, "_construct_copy": construct_copy, "_template": template}
-    made = _AnyScalar(cls.__name__, tuple(in_scalar(base) for base in cls.__bases__), members)
+    bases = tuple(_base_for_scalar(cls, base, T) for base in cls.__bases__)
+    made = _AnyScalar(cls.__name__, bases, members)
     this_class.cell_contents = made
     init: Any = own_init or made.__init__  # type: ignore[misc]
     parameters = list(inspect.signature(init).parameters.values())[1:]
     made.__signature__ = inspect.Signature(parameters)
     return made
+
+
+def _base_for_scalar(cls: type, base: type, T: type) -> type:
+    """Return what stands for a base of `cls` where the scalar is T."""
+    if base is LeafSystem:
+        return _leaf_system(T)
+    if "_template" in vars(base):
+        return template_of(base)[T]
+    if issubclass(base, LeafSystem):
+        raise TypeError(f"{cls.__name__}: its base {base.__name__} is not @scalar_convertible")
+    return base
+
+
+@functools.cache
+def _leaf_system(T: type) -> type:
+    """Return `LeafSystem_[T]`, whose constructor is told how to convert by `_for_scalar`."""
+
+    class Convertible(LeafSystem_[T]):
+        def __init__(self) -> None:
+            super().__init__(converter=self._made_with[2])
+
+    return Convertible
 
 
 def _rebound(member: Any, this_class: CellType) -> Any:
@@ -154,7 +166,7 @@ def _on_a_short_stack(make: Callable[[], type]) -> type:
 
 def value(array: np.ndarray) -> np.ndarray:
     """Return the plain numbers of an array of float or AutoDiffXd."""
-    return ExtractValue(array).ravel() if array.dtype == object else array
+    return ExtractValue(array).ravel() if array.dtype.hasobject else array
 
 
 def chain(y: np.ndarray, jacobian: np.ndarray, *args: np.ndarray) -> np.ndarray:
@@ -165,13 +177,14 @@ def chain(y: np.ndarray, jacobian: np.ndarray, *args: np.ndarray) -> np.ndarray:
         jacobian: (m, n) by all `args`, one after another.
         args: arrays of float or AutoDiffXd, of n numbers together.
     """
-    gradients = [ExtractGradient(a) if a.dtype == object else None for a in args]
+    gradients = [ExtractGradient(a) if a.dtype.hasobject else None for a in args]
     width = max((g.shape[1] for g in gradients if g is not None), default=0)
     total = np.zeros((y.size, width))
-    blocks = np.split(jacobian, np.cumsum([a.size for a in args])[:-1], axis=1)
-    for block, gradient in zip(blocks, gradients, strict=True):
+    start = 0
+    for a, gradient in zip(args, gradients, strict=True):
         if gradient is not None and gradient.shape[1]:
-            total += block @ gradient
+            total += jacobian[:, start : start + a.size] @ gradient
+        start += a.size
     return InitializeAutoDiff(y, total).ravel()
 
 
@@ -183,8 +196,9 @@ def lift(function: Any, at: tuple[Any, ...], *args: np.ndarray) -> np.ndarray:
         at: what it is called with: plain numbers.
         args: (n_i,) arrays of float or AutoDiffXd, whose values are in `at`.
     """
-    if any(a.dtype == object for a in args):
-        return chain(*function.with_jacobian(*at), *args)
+    for a in args:
+        if a.dtype.hasobject:
+            return chain(*function.with_jacobian(*at), *args)
     return function(*at)
 
 
@@ -228,6 +242,16 @@ def check_finite(plain: np.ndarray, system: LeafSystem, context: Context, what: 
     numbers = np.array2string(plain, precision=4, threshold=12)
     where = f"{what} of {system.GetSystemPathname()}"
     raise SimulationError(where, seconds(context), f"not finite: {numbers}")
+
+
+def noise_input(system: LeafSystem, size: int) -> InputPort:
+    """Declare the input port "noise": standard normal numbers, none where it is left open.
+
+    Args:
+        system: gets the port.
+        size: of the port.
+    """
+    return system.DeclareVectorInputPort("noise", size, RandomDistribution.kGaussian)
 
 
 def optional_input(port: InputPort, context: Context) -> np.ndarray:

@@ -89,7 +89,7 @@ class CatenaryCableForce(LeafSystem):
             self._rate_port.Eval(context),
         )
         jacobian = None
-        if args[0].dtype != object:
+        if not args[0].dtype.hasobject:
             packed, status = self._cables(*args)
         else:
             packed, status, jacobian = self._cables.with_jacobian(*map(value, args))

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.common import RandomDistribution
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from cdpr_drake.model.camera import MeasuredPose
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.systems._template import (
-    GAUSSIAN_INPUT,
     chain,
     check_finite,
     finite_inputs,
     lift,
+    noise_input,
     optional_input,
     scalar_convertible,
     value,
@@ -51,9 +50,7 @@ class CameraMeasurement(LeafSystem):
         self._measured = MeasuredPose(robot, self.calibrated)
         self._sigma = np.repeat([true.orientation_noise, true.position_noise], 3)
         self._pose_port = self.DeclareVectorInputPort("pose", 6)
-        self._noise_port = self.DeclareVectorInputPort(
-            GAUSSIAN_INPUT, 6, RandomDistribution.kGaussian
-        )
+        self._noise_port = noise_input(self, 6)
         tickets = {self._pose_port.ticket(), self._noise_port.ticket()}
         self.DeclareVectorOutputPort("measured_pose", 6, self._calc_pose, tickets)
 
@@ -90,9 +87,7 @@ class CableTangentCameras(LeafSystem):
         self._sigma = robot.cameras.tangent_noise
         n = self._size = 3 * robot.num_cables
         self._tangents_port = self.DeclareVectorInputPort("tangents", n)
-        self._noise_port = self.DeclareVectorInputPort(
-            GAUSSIAN_INPUT, n, RandomDistribution.kGaussian
-        )
+        self._noise_port = noise_input(self, n)
         tickets = {self._tangents_port.ticket(), self._noise_port.ticket()}
         self.DeclareVectorOutputPort("measured_tangents", n, self._calc_tangents, tickets)
 
@@ -104,7 +99,7 @@ class CableTangentCameras(LeafSystem):
         noisy = noisy.reshape(-1, 3)
         norm = np.sqrt(np.einsum("ij,ij->i", noisy, noisy))[:, np.newaxis]
         unit = noisy / norm
-        if u.dtype != object:
+        if not u.dtype.hasobject:
             output.SetFromVector(unit.ravel())
             return
         jacobian = np.zeros((self._size, self._size))

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.common import RandomDistribution
 from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem, OutputPort
 
 from cdpr_drake.model.cables import CableSet, packed_sizes
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array
 from cdpr_drake.model.winch import WinchModel
-from cdpr_drake.systems._template import GAUSSIAN_INPUT, Calc, check_finite, part_of_port
+from cdpr_drake.systems._template import Calc, check_finite, noise_input, part_of_port
 from cdpr_drake.systems.cable_force import raise_cable_error
 from cdpr_drake.systems.load_cell import LoadCellFilter
 
@@ -86,9 +85,7 @@ class FusedPlant(LeafSystem):
         state = self.DeclareContinuousState(self._size)
         self._rates_port = self.DeclareVectorInputPort("motor_rates", k)
         self._wrench_port = self.DeclareVectorInputPort("external_wrench", 6)
-        self._noise_port = self.DeclareVectorInputPort(
-            GAUSSIAN_INPUT, k, RandomDistribution.kGaussian
-        )
+        self._noise_port = noise_input(self, k)
         self._state_port = self.DeclareStateOutputPort("state", state)
         self._packed_port = self._declare("packed", sum(packed_sizes(k).values()), self._solve)
         self._declare_outputs()

@@ -53,7 +53,7 @@ class InverseKinematicsAngles(LeafSystem):
     def _calc_angles(self, context: Context, output: BasicVector) -> None:
         pose = self._pose_port.Eval(context)
         check_finite(value(pose), self, context, "input desired_pose")
-        plain = pose.dtype != object
+        plain = not pose.dtype.hasobject
         lengths, jacobian = self._inverse.lengths_and_jacobian(value(pose), not plain)
         angles = (lengths - self._zero) / self._transmission
         if not plain:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.common import RandomDistribution
 from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
 
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.vision.outages import LOAD_CELL, Outage, Outages
 from cdpr_drake.systems._template import (
-    GAUSSIAN_INPUT,
     chain,
     check_finite,
+    noise_input,
     scalar_convertible,
     seconds,
     value,
@@ -77,9 +76,7 @@ class LoadCellFilter(LeafSystem):
         self._no_noise = np.zeros(k)
         state = self.DeclareContinuousState(self._order * k)
         self._tension_port = self.DeclareVectorInputPort("tension_at_winch", k)
-        self._noise_port = self.DeclareVectorInputPort(
-            GAUSSIAN_INPUT, k, RandomDistribution.kGaussian
-        )
+        self._noise_port = noise_input(self, k)
         if self._order == 1:
             self.DeclareStateOutputPort("measured_tension", state)
         else:
@@ -108,7 +105,7 @@ class LoadCellFilter(LeafSystem):
         plain = value(x), value(tension), value(noise)
         if not self._filter(*plain, self.parameters, xdot):
             check_finite(xdot, self, context, "derivatives")
-        if x.dtype == object:
+        if x.dtype.hasobject:
             xdot = chain(xdot, self._jacobian(), x, tension, noise)
         if self._outages:
             self._fail(seconds(context), x, xdot)

@@ -9,7 +9,13 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Leaf
 
 from cdpr_drake.model.load_cells import HANDOVER, CellJudge
 from cdpr_drake.model.robot import CableRobot
-from cdpr_drake.systems._template import chain, check_finite, scalar_convertible, value
+from cdpr_drake.systems._template import (
+    chain,
+    check_finite,
+    finite_inputs,
+    scalar_convertible,
+    value,
+)
 
 
 @scalar_convertible
@@ -38,10 +44,9 @@ class PlausibleTension(LeafSystem):
     plausible_tension (k) [N] are at the drawing points; cell_health (k) is 0 for a live cell, 1
     for a dead, 2 for a stuck one.
 
-    State, if it samples, else none and no cell is found stuck: discrete, each cell's reading
-    when it last changed [N], what was expected then [N], how far it is stuck (3 k). A linear
-    model of the update is that of live cells, whose readings change: all is forgotten in a
-    frame.
+    State, if it samples, else none and no cell is found stuck: discrete, each cell's reading when
+    it last changed [N], what was expected then [N], how far it is stuck (3 k). A linear model of
+    the update is that of live cells, whose readings change: all is forgotten in a frame.
 
     Args:
         robot: the robot as the controller believes it.
@@ -91,13 +96,12 @@ class PlausibleTension(LeafSystem):
 
     def _plain(self, parts: tuple[np.ndarray, ...], context: Context) -> list[np.ndarray]:
         """Return parts of the input as floats, known to be finite."""
-        plain = [value(part) for part in parts]
-        check_finite(np.concatenate(plain), self, context, "inputs")
-        return plain
+        finite_inputs(self, context, *parts)
+        return [value(part) for part in parts]
 
     def _calc(self, context: Context, output: BasicVector) -> None:
         parts = self._inputs(context)
-        if parts[0].dtype == object:
+        if parts[0].dtype.hasobject:
             output.SetFromVector(self._chained(parts, context, 0))
             return
         tension = self._judge.plausible(*parts)
@@ -109,7 +113,7 @@ class PlausibleTension(LeafSystem):
     def _chained(self, parts: tuple[np.ndarray, ...], context: Context, row: int) -> np.ndarray:
         """Return one row of the judgement as AutoDiffXd."""
         k = self._k
-        z = np.concatenate(self._plain(parts, context))
+        z = finite_inputs(self, context, *parts)
         judged, jacobian = self._judge.with_jacobian(np.delete(z, np.s_[6 + k : 6 + 3 * k]))
         return chain(judged[row], jacobian[row], *parts[:2], parts[2][2 * k :])
 
@@ -119,7 +123,7 @@ class PlausibleTension(LeafSystem):
 
     def _update(self, context: Context, discrete: DiscreteValues) -> None:
         pose, reading = self._pose_port.Eval(context), self._tension_port.Eval(context)
-        if pose.dtype != object:
+        if not pose.dtype.hasobject:
             # Drake hands in the state as it is: it is changed in place.
             memory = discrete.get_mutable_value()
             self._judge.remember(pose, reading, memory, memory)

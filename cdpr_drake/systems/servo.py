@@ -66,18 +66,10 @@ class PositionBasedVisualServo(LeafSystem):
         self._tension_port = self.DeclareVectorInputPort("measured_tension", k)
         self._desired_port = self.DeclareVectorInputPort("desired_pose", 6)
         self._twist_port = self.DeclareVectorInputPort("desired_twist", 6)
-        self.DeclareVectorOutputPort(
-            "motor_rates",
-            k,
-            self._calc_rates,
-            {self.all_input_ports_ticket(), self.time_ticket()},
-        )
-        self.DeclareVectorOutputPort(
-            "pose_error",
-            6,
-            self._calc_error,
-            {self._pose_port.ticket(), self._desired_port.ticket()},
-        )
+        needed = {self.all_input_ports_ticket(), self.time_ticket()}
+        poses = {self._pose_port.ticket(), self._desired_port.ticket()}
+        self.DeclareVectorOutputPort("motor_rates", k, self._calc_rates, needed)
+        self.DeclareVectorOutputPort("pose_error", 6, self._calc_error, poses)
 
     def _calc_rates(self, context: Context, output: BasicVector) -> None:
         args = (
@@ -161,6 +153,6 @@ class MotorAngleIntegrator(LeafSystem):
     def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
         """Write the derivatives of the state in a context."""
         rates = self._rates_port.Eval(context)
-        if rates.dtype == object or not rates.dot(rates) < math.inf:
+        if rates.dtype.hasobject or not rates.dot(rates) < math.inf:
             check_finite(value(rates), self, context, "input motor_rates")
         derivatives.SetFromVector(rates)

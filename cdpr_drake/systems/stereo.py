@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.common import RandomDistribution
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
@@ -11,7 +10,7 @@ from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, vector_to_pose
 from cdpr_drake.model.vision.outages import STEREO_PAIR, Outage, Outages
 from cdpr_drake.model.vision.tangents import CableImages, TangentEstimate, TangentEstimator
-from cdpr_drake.systems._template import GAUSSIAN_INPUT, check_finite, part_of_state
+from cdpr_drake.systems._template import check_finite, finite_inputs, noise_input, part_of_state
 
 
 class StereoCameras(LeafSystem):
@@ -50,9 +49,7 @@ class StereoCameras(LeafSystem):
         self._tension_port = self.DeclareVectorInputPort("tension_at_drawing_point", k)
         self._pose_port = self.DeclareVectorInputPort("measured_pose", 6)
         self._measured_tension_port = self.DeclareVectorInputPort("measured_tension", k)
-        self._noise_port = self.DeclareVectorInputPort(
-            GAUSSIAN_INPUT, noise_size, RandomDistribution.kGaussian
-        )
+        self._noise_port = noise_input(self, noise_size)
         self.DeclareDiscreteState(6 * k)
         self.DeclarePeriodicDiscreteUpdateEvent(self.sample_time, 0.0, self._update)
         start = 0
@@ -94,12 +91,12 @@ class StereoCameras(LeafSystem):
 
     def _cables(self, context: Context) -> tuple[Array, Array]:
         tangents, tension = self._tangents_port.Eval(context), self._tension_port.Eval(context)
-        check_finite(np.append(tangents, tension), self, context, "inputs")
+        finite_inputs(self, context, tangents, tension)
         return tangents, tension
 
     def _measured(self, context: Context) -> tuple[Array, RigidTransform]:
         tension, pose = self._measured_tension_port.Eval(context), self._pose_port.Eval(context)
-        check_finite(np.append(pose, tension), self, context, "inputs")
+        finite_inputs(self, context, pose, tension)
         return tension, vector_to_pose(pose)
 
     def _measure(self, context: Context, edges: Array) -> TangentEstimate:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.common import RandomDistribution
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
 
@@ -12,7 +11,7 @@ from cdpr_drake.model.rotations import vector_to_pose
 from cdpr_drake.model.vision.outages import POSE_CAMERA, Outage, Outages
 from cdpr_drake.model.vision.pose import PoseEstimate, PoseEstimator
 from cdpr_drake.model.vision.targets import Sightings, TargetImages
-from cdpr_drake.systems._template import GAUSSIAN_INPUT, check_finite
+from cdpr_drake.systems._template import check_finite, noise_input
 from cdpr_drake.systems.held_pose import HeldPose
 
 
@@ -75,9 +74,7 @@ class TargetCameras(HeldPose):
         self._estimate = PoseEstimator(self.calibrated, estimator)
         self._outages = Outages(outages, POSE_CAMERA, self.num_cameras)
         self._pose_port = self.DeclareVectorInputPort("pose", 6)
-        self._noise_port = self.DeclareVectorInputPort(
-            GAUSSIAN_INPUT, self._images.noise_size, RandomDistribution.kGaussian
-        )
+        self._noise_port = noise_input(self, self._images.noise_size)
 
     def measure(self, context: Context, prior: RigidTransform | None) -> PoseEstimate | None:
         """Return the pose that the points seen now give, or None; see `HeldPose`.

@@ -81,7 +81,7 @@ class WinchDynamics(LeafSystem):
         """Write the derivatives of the state in a context."""
         x = self._state_port.Eval(context)
         desired, tension = self._desired_port.Eval(context), self._tension_port.Eval(context)
-        if x.dtype != object:
+        if not x.dtype.hasobject:
             xdot, finite = self._model.derivatives(x, desired, tension)
         else:
             xdot, finite = self._evaluate(x, desired, tension)[: 3 * self._k], False
