@@ -57,7 +57,7 @@ def scalar_convertible(cls: C) -> C:
         cls: a class derived from LeafSystem, or from one that is decorated.
 
     Raises:
-        TypeError: it is derived from another system; at conversion: of an undecorated subclass.
+        TypeError: it has another base, or several; at conversion: of an undecorated subclass.
     """
     name, scope = cls.__name__, sys.modules[cls.__module__]
 
@@ -81,18 +81,6 @@ def template_of(cls: type) -> Any:
     return vars(cls)["_template"]
 
 
-class _AnyScalar(type(LeafSystem)):  # type: ignore[misc]
-    """The type of decorated classes, each of which counts as one with those for other scalars."""
-
-    def __instancecheck__(cls, instance: object) -> bool:
-        if super().__instancecheck__(instance):
-            return True
-        own = vars(cls).get("_template")  # a subclass that is not decorated has none
-        return own is not None and any(
-            vars(c).get("_template") is own for c in type(instance).__mro__
-        )
-
-
 def _for_scalar(cls: type, T: type, template: Any) -> type:
     """Return `cls` derived from `LeafSystem_[T]`, as Drake's template takes it."""
 
@@ -113,24 +101,24 @@ def _for_scalar(cls: type, T: type, template: Any) -> type:
         members.pop(name, None)
     own_init = members.pop("__init__", None)
     members |= {"_construct": construct, "_construct_copy": construct_copy, "_template": template}
-    bases = tuple(_base_for_scalar(cls, base, T) for base in cls.__bases__)
-    made = _AnyScalar(cls.__name__, bases, members)
+    if T is not float:  # isinstance asks for this too, so that it holds for either scalar
+        members["__class__"] = property(lambda self: template[float])
+    made: Any = type(cls.__name__, (_base_for_scalar(cls, T),), members)
     this_class.cell_contents = made
-    init: Any = own_init or made.__init__  # type: ignore[misc]
+    init = own_init or made.__init__
     parameters = list(inspect.signature(init).parameters.values())[1:]
     made.__signature__ = inspect.Signature(parameters)
     return made
 
 
-def _base_for_scalar(cls: type, base: type, T: type) -> type:
-    """Return what stands for a base of `cls` where the scalar is T."""
-    if base is LeafSystem:
+def _base_for_scalar(cls: Any, T: type) -> type:
+    """Return what stands for the base of `cls` where the scalar is T."""
+    if cls.__bases__ == (LeafSystem,):
         return _leaf_system(T)
-    if "_template" in vars(base):
-        return template_of(base)[T]
-    if issubclass(base, LeafSystem):
-        raise TypeError(f"{cls.__name__}: its base {base.__name__} is not @scalar_convertible")
-    return base
+    if len(cls.__bases__) > 1 or "_template" not in vars(cls.__base__):
+        bases = ", ".join(base.__name__ for base in cls.__bases__)
+        raise TypeError(f"{cls.__name__}({bases}): no LeafSystem or @scalar_convertible class")
+    return template_of(cls.__base__)[T]
 
 
 @functools.cache
