@@ -208,7 +208,9 @@ def finite_inputs(system: LeafSystem, context: Context, *args: np.ndarray) -> np
         context: its context.
         args: (n_i,) arrays of float or AutoDiffXd.
     """
-    z = np.concatenate([value(a) for a in args])
+    z = np.concatenate(args)
+    if z.dtype.hasobject:
+        z = np.concatenate([value(a) for a in args])
     check_finite(z, system, context, "inputs")
     return z
 

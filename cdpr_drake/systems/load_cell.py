@@ -101,12 +101,12 @@ class LoadCellFilter(LeafSystem):
             noise = self._noise_port.Eval(context)
         if self._amplitude > 0.0:
             tension = tension + self._vibration(seconds(context))
-        xdot = np.empty(x.size)
-        plain = value(x), value(tension), value(noise)
+        args, xdot = (x, tension, noise), np.empty(x.size)
+        plain = map(value, args) if x.dtype.hasobject else args
         if not self._filter(*plain, self.parameters, xdot):
             check_finite(xdot, self, context, "derivatives")
         if x.dtype.hasobject:
-            xdot = chain(xdot, self._jacobian(), x, tension, noise)
+            xdot = chain(xdot, self._jacobian(), *args)
         if self._outages:
             self._fail(seconds(context), x, xdot)
         derivatives.SetFromVector(xdot)
