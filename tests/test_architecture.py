@@ -163,14 +163,10 @@ def plain_function(thing: Any) -> Any:
 
 
 def arguments(thing: Any) -> list[str]:
-    """Return the names of a function's or class's arguments.
-
-    A system made for several scalar types takes those of `_construct`, which Drake calls.
-    """
+    """Return the names of a function's or class's arguments."""
     kinds = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
-    given = ("self", "cls", "converter")  # by Python, or by Drake
-    parameters = inspect.signature(getattr(thing, "_construct", thing)).parameters.values()
-    return [p.name for p in parameters if p.kind not in kinds and p.name not in given]
+    parameters = inspect.signature(thing).parameters.values()
+    return [p.name for p in parameters if p.kind not in kinds and p.name not in ("self", "cls")]
 
 
 def commented_fields(cls: type) -> str:

@@ -6,7 +6,14 @@ import math
 from typing import Any
 
 from pydrake.common import RandomDistribution
-from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, LeafSystem, OutputPort
+from pydrake.systems.framework import (
+    Diagram,
+    DiagramBuilder,
+    InputPort,
+    LeafSystem,
+    OutputPort,
+    System,
+)
 from pydrake.systems.primitives import DiscreteTimeDelay, RandomSource, ZeroOrderHold
 
 from cdpr_drake.diagrams.eyes import add_pose_cameras, add_tangent_cameras, check_sensors
@@ -205,7 +212,7 @@ def _add_plant(
     outages: tuple[Outage, ...],
     modelled: tuple[str, ...],
     fused: bool,
-) -> tuple[Any, Any, Any]:
+) -> tuple[System, System | None, System]:
     """Add what is continuous; return what has the robot's, the load cells', the integrator's ports.
 
     There are no load cells where tensions are modelled.

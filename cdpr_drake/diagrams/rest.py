@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydrake.common import RandomGenerator
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, Diagram, System
+from pydrake.systems.framework import Context, Diagram, InputPort, System
 from pydrake.systems.primitives import DiscreteTimeDelay, ZeroOrderHold
 
 from cdpr_drake.model.equilibrium import RestState, forward_kinematics, rest_state
@@ -125,7 +124,7 @@ def _fill_samplers(systems: dict[tuple[str, ...], System], context: Context) -> 
             system.set_at_rest(system.GetMyMutableContextFromRoot(context))
 
 
-def leaf_systems(diagram: Diagram) -> Iterator[tuple[tuple[str, ...], Any]]:
+def leaf_systems(diagram: Diagram) -> Iterator[tuple[tuple[str, ...], System]]:
     """Yield (path of names, system) for every system inside a diagram that is not a diagram.
 
     Args:
@@ -154,7 +153,7 @@ def robot_of(diagram: Diagram) -> CableRobot:
     raise ValueError(f'diagram "{diagram.get_name()}" has no block "cables", so no cable robot')
 
 
-def _rest(systems: dict[tuple[str, ...], Any], X_WP: RigidTransform, tensions: str) -> RestState:
+def _rest(systems: dict[tuple[str, ...], System], X_WP: RigidTransform, tensions: str) -> RestState:
     robot = next(
         s.robot for path, s in systems.items() if path[-1] == "cables" or isinstance(s, FusedPlant)
     )
@@ -166,5 +165,5 @@ def _rest(systems: dict[tuple[str, ...], Any], X_WP: RigidTransform, tensions: s
     return rest_state(robot, X_WP, tensions)
 
 
-def _input_port(diagram: Diagram, name: str) -> Any:
+def _input_port(diagram: Diagram, name: str) -> InputPort | None:
     return diagram.GetInputPort(name) if diagram.HasInputPort(name) else None

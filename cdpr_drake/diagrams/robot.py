@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RotationalInertia, RpyFloatingJoint, SpatialInertia, UnitInertia
-from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import Adder, AffineSystem, Demultiplexer
 
 from cdpr_drake.model.cables import packed_sizes
@@ -150,7 +150,7 @@ def _transmission(robot: CableRobot) -> AffineSystem:
     )
 
 
-def platform_pose(diagram: Diagram, context: object) -> RigidTransform:
+def platform_pose(diagram: Diagram, context: Context) -> RigidTransform:
     """Return X_WP in a context of `make_cable_robot` or of a loop around it.
 
     Args:

@@ -2,117 +2,105 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from pydrake.systems.framework import LeafSystem_
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from cdpr_drake.errors import CableError
 from cdpr_drake.model.cables import CableSet, packed_sizes
 from cdpr_drake.model.robot import CableRobot
-from cdpr_drake.systems._template import chain, check_finite, system_template, value
+from cdpr_drake.systems._template import (
+    chain,
+    check_finite,
+    part_of_port,
+    scalar_convertible,
+    seconds,
+    value,
+)
 
 
-@system_template("CatenaryCableForce")
-def CatenaryCableForce_(T: type) -> type:
-    class Impl(LeafSystem_[T]):
-        """Forces of k sagging elastic cables on the platform, with their tensions and tangents.
+@scalar_convertible
+class CatenaryCableForce(LeafSystem):
+    """Forces of k sagging elastic cables on the platform, with their tensions and tangents.
 
-        .. pydrake_system::
+    .. pydrake_system::
 
-            name: CatenaryCableForce
-            input_ports:
-            - platform_state
-            - unstrained_length
-            - unstrained_length_rate
-            output_ports:
-            - platform_wrench
-            - tension_at_drawing_point
-            - tension_at_attachment_point
-            - tangents_at_drawing_point
-            - tangents_at_attachment_point
-            - dbeta
-            - packed
+        name: CatenaryCableForce
+        input_ports:
+        - platform_state
+        - unstrained_length
+        - unstrained_length_rate
+        output_ports:
+        - platform_wrench
+        - tension_at_drawing_point
+        - tension_at_attachment_point
+        - tangents_at_drawing_point
+        - tangents_at_attachment_point
+        - dbeta
+        - packed
 
-        Each cable is the exact elastic catenary (Irvine, Cable Structures, 1981) between its
-        drawing point A and attachment point B, in series with the run from drum to eyelet, which
-        stretches with it. Structural damping resists the rate s at which a cable stretches, as its
-        tension at rest has it, not its gain of chord, which may be loss of sag:
+    Each cable is the exact elastic catenary (Irvine, Cable Structures, 1981) between its
+    drawing point A and attachment point B, in series with the run from drum to eyelet, which
+    stretches with it. Structural damping resists the rate s at which a cable stretches, as its
+    tension at rest has it, not its gain of chord, which may be loss of sag:
 
-            s = e_B . v_B + e_l dl/dt,   T_d = (E A t_d / l) s,
-            force on the platform - e_B T_d,   T_A - e_l T_d,
+        s = e_B . v_B + e_l dl/dt,   T_d = (E A t_d / l) s,
+        force on the platform - e_B T_d,   T_A - e_l T_d,
 
-        with the gradient e of the stretch (kernels/catenary.py), so that it takes out the power
-        T_d s >= 0. Where T_A, or T_B along the tangent, would become negative, T_d is held at what
-        makes it zero: no cable pushes. Slack cables are hardly damped.
+    with the gradient e of the stretch (kernels/catenary.py), so that it takes out the power
+    T_d s >= 0. Where T_A, or T_B along the tangent, would become negative, T_d is held at what
+    makes it zero: no cable pushes. Slack cables are hardly damped.
 
-        platform_state (12) is [roll, pitch, yaw, x, y, z, omega, v] of the platform in W, as the
-        plant has it; unstrained_length (k) [m] includes the run; platform_wrench (6) is [torque;
-        force] at the platform's origin in W; tangents (3 k) are unit vectors from A to B in W,
-        cable after cable; dbeta (k) [rad] is the angle from chord to tangent at B (section 6.1);
-        packed (6 + 9 k) holds all of these one after another: all ports share its one solution
-        per state, and a Demultiplexer splits it fast.
+    platform_state (12) is [roll, pitch, yaw, x, y, z, omega, v] of the platform in W, as the
+    plant has it; unstrained_length (k) [m] includes the run; platform_wrench (6) is [torque;
+    force] at the platform's origin in W; tangents (3 k) are unit vectors from A to B in W,
+    cable after cable; dbeta (k) [rad] is the angle from chord to tangent at B (section 6.1);
+    packed (6 + 9 k) holds all of these one after another: all ports share its one solution
+    per state, and a Demultiplexer splits it fast.
 
-        Args:
-            robot: the robot.
+    Args:
+        robot: the robot.
 
-        Raises:
-            CableError: at evaluation, when a cable has no catenary or exceeds its breaking load.
-        """
+    Raises:
+        CableError: at evaluation, when a cable has no catenary or exceeds its breaking load.
+    """
 
-        def _construct(self, robot: CableRobot, *, converter: Any = None) -> None:
-            super().__init__(converter=converter)
-            self.robot = robot
-            self._cables = CableSet(robot)
-            k = self._k = robot.num_cables
-            self._state_port = self.DeclareVectorInputPort("platform_state", 12)
-            self._length_port = self.DeclareVectorInputPort("unstrained_length", k)
-            self._rate_port = self.DeclareVectorInputPort("unstrained_length_rate", k)
-            sizes = packed_sizes(k)
-            self._packed_port = self.DeclareVectorOutputPort(
-                "packed", sum(sizes.values()), self._solve, {self.all_input_ports_ticket()}
-            )
-            start = 0
-            for name, size in sizes.items():
-                part = self._part(slice(start, start + size))
-                self.DeclareVectorOutputPort(name, size, part, {self.all_input_ports_ticket()})
-                start += size
+    def __init__(self, robot: CableRobot) -> None:
+        super().__init__()
+        self.robot = robot
+        self._cables = CableSet(robot)
+        k = robot.num_cables
+        self._state_port = self.DeclareVectorInputPort("platform_state", 12)
+        self._length_port = self.DeclareVectorInputPort("unstrained_length", k)
+        self._rate_port = self.DeclareVectorInputPort("unstrained_length_rate", k)
+        sizes = packed_sizes(k)
+        self._packed_port = self.DeclareVectorOutputPort(
+            "packed", sum(sizes.values()), self._solve, {self.all_input_ports_ticket()}
+        )
+        start = 0
+        for name, size in sizes.items():
+            part = part_of_port(self._packed_port, slice(start, start + size))
+            self.DeclareVectorOutputPort(name, size, part, {self.all_input_ports_ticket()})
+            start += size
 
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, other.robot, converter=converter)
-
-        def _solve(self, context: Any, output: Any) -> None:
-            args = (
-                self._state_port.Eval(context),
-                self._length_port.Eval(context),
-                self._rate_port.Eval(context),
-            )
-            if T is float:
-                packed, status = self._cables(*args)
-            else:
-                plain = [value(a) for a in args]
-                packed, status, jacobian = self._cables.with_jacobian(*plain)
-                if not status:
-                    packed = chain(packed, np.split(jacobian, [12, 12 + self._k], axis=1), *args)
-            if status:
-                check_finite(value(args[0]), self, context, "input platform_state")
-                raise_cable_error(self.robot, context, value(args[1]), value(packed), status)
-            output.SetFromVector(packed)
-
-        def _part(self, part: slice) -> Any:
-            def calc(context: Any, output: Any) -> None:
-                output.SetFromVector(self._packed_port.Eval(context)[part])
-
-            return calc
-
-    return Impl
-
-
-CatenaryCableForce = CatenaryCableForce_[None]
+    def _solve(self, context: Context, output: BasicVector) -> None:
+        args = (
+            self._state_port.Eval(context),
+            self._length_port.Eval(context),
+            self._rate_port.Eval(context),
+        )
+        jacobian = None
+        if not args[0].dtype.hasobject:
+            packed, status = self._cables(*args)
+        else:
+            packed, status, jacobian = self._cables.with_jacobian(*map(value, args))
+        if status:
+            check_finite(value(args[0]), self, context, "input platform_state")
+            raise_cable_error(self.robot, context, value(args[1]), packed, status)
+        output.SetFromVector(packed if jacobian is None else chain(packed, jacobian, *args))
 
 
 def raise_cable_error(
-    robot: CableRobot, context: Any, length: np.ndarray, packed: np.ndarray, status: int
+    robot: CableRobot, context: Context, length: np.ndarray, packed: np.ndarray, status: int
 ) -> None:
     """Raise what a status of `CableSet` that is not 0 means.
 
@@ -126,7 +114,7 @@ def raise_cable_error(
     Raises:
         CableError: always.
     """
-    time = float(value(np.array([context.get_time()]))[0])
+    time = seconds(context)
     cable, k = abs(status), robot.num_cables
     if status > 0:
         raise CableError(cable, time, f"no catenary of unstrained length {length[cable - 1]:.6g} m")

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from pydrake.common import RandomDistribution
-from pydrake.systems.framework import LeafSystem
+from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem, OutputPort
 
 from cdpr_drake.model.cables import CableSet, packed_sizes
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array
 from cdpr_drake.model.winch import WinchModel
-from cdpr_drake.systems._template import GAUSSIAN_INPUT, check_finite
+from cdpr_drake.systems._template import Calc, check_finite, noise_input, part_of_port
 from cdpr_drake.systems.cable_force import raise_cable_error
 from cdpr_drake.systems.load_cell import LoadCellFilter
 
@@ -88,9 +85,7 @@ class FusedPlant(LeafSystem):
         state = self.DeclareContinuousState(self._size)
         self._rates_port = self.DeclareVectorInputPort("motor_rates", k)
         self._wrench_port = self.DeclareVectorInputPort("external_wrench", 6)
-        self._noise_port = self.DeclareVectorInputPort(
-            GAUSSIAN_INPUT, k, RandomDistribution.kGaussian
-        )
+        self._noise_port = noise_input(self, k)
         self._state_port = self.DeclareStateOutputPort("state", state)
         self._packed_port = self._declare("packed", sum(packed_sizes(k).values()), self._solve)
         self._declare_outputs()
@@ -103,7 +98,7 @@ class FusedPlant(LeafSystem):
         """
         return self._cells.reading(tension_at_winch)
 
-    def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
+    def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
         """Write the derivatives of the state in a context."""
         noise, wrench = self._no_noise, self._no_wrench
         if self._noise_port.HasValue(context):
@@ -121,17 +116,11 @@ class FusedPlant(LeafSystem):
             check_finite(ydot, self, context, "derivatives")
         derivatives.SetFromVector(ydot)
 
-    def _declare(self, name: str, size: int, calc: Any) -> Any:
+    def _declare(self, name: str, size: int, calc: Calc) -> OutputPort:
         return self.DeclareVectorOutputPort(name, size, calc, {self.xc_ticket()})
 
     def _declare_outputs(self) -> None:
         k, y = self._k, self._state_port
-
-        def part_of(port: Any, part: slice) -> Any:
-            def calc(context: Any, output: Any) -> None:
-                output.SetFromVector(port.Eval(context)[part])
-
-            return calc
 
         parts = {"pose": slice(0, 6), "platform_state": slice(0, 12)}
         parts["motor_angles"] = slice(12, 12 + k)
@@ -139,16 +128,16 @@ class FusedPlant(LeafSystem):
         parts["measured_tension"] = slice(self._size - 2 * k, self._size - k)
         parts["desired_motor_angles"] = slice(self._size - k, self._size)
         for name, part in parts.items():
-            self._declare(name, part.stop - part.start, part_of(y, part))
+            self._declare(name, part.stop - part.start, part_of_port(y, part))
         start = 0
         for name, size in packed_sizes(k).items():
-            self._declare(name, size, part_of(self._packed_port, slice(start, start + size)))
+            self._declare(name, size, part_of_port(self._packed_port, slice(start, start + size)))
             start += size
         self._declare("unstrained_length", k, self._calc_length)
         self._declare("motor_torques", k, self._calc_torque)
         self._declare("tension_at_winch", k, self._calc_tension)
 
-    def _solve(self, context: Any, output: Any) -> None:
+    def _solve(self, context: Context, output: BasicVector) -> None:
         y = self._state_port.Eval(context)
         length, rate = self._motion(y)
         packed, status = self._cables(y[:12], length, rate)
@@ -163,19 +152,19 @@ class FusedPlant(LeafSystem):
         length = winch.encoder_zero_length + winch.transmission * y[12 : 12 + k]
         return length, winch.transmission * y[12 + k : 12 + 2 * k]
 
-    def _winches(self, context: Any) -> Array:
+    def _winches(self, context: Context) -> Array:
         """Return [derivative (3 k); torques (k); tensions at the winches (k)]."""
         y, k = self._state_port.Eval(context), self._k
         T_A = self._packed_port.Eval(context)[6 : 6 + k]
         return self._winch(y[12 : 12 + 3 * k], y[self._size - k :], T_A)
 
-    def _calc_length(self, context: Any, output: Any) -> None:
+    def _calc_length(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(self._motion(self._state_port.Eval(context))[0])
 
-    def _calc_torque(self, context: Any, output: Any) -> None:
+    def _calc_torque(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(self._winches(context)[3 * self._k : 4 * self._k])
 
-    def _calc_tension(self, context: Any, output: Any) -> None:
+    def _calc_tension(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(self._winches(context)[4 * self._k :])
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import LeafSystem
+from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from cdpr_drake.errors import GeometryError, SimulationError
 from cdpr_drake.model.rotations import Array, pose_to_vector, vector_to_pose
@@ -72,7 +70,7 @@ class HeldPose(LeafSystem):
             size = part.stop - part.start
             self.DeclareVectorOutputPort(name, size, part_of_state(part), {self.xd_ticket()})
 
-    def measure(self, context: Any, prior: RigidTransform | None) -> PoseEstimate | None:
+    def measure(self, context: Context, prior: RigidTransform | None) -> PoseEstimate | None:
         """Return the pose that the inputs show now, or None where they show too little.
 
         Args:
@@ -81,7 +79,7 @@ class HeldPose(LeafSystem):
         """
         raise NotImplementedError
 
-    def measure_at_rest(self, context: Any) -> PoseEstimate | None:
+    def measure_at_rest(self, context: Context) -> PoseEstimate | None:
         """Return the pose that all cameras show now without noise, or None.
 
         Args:
@@ -89,7 +87,7 @@ class HeldPose(LeafSystem):
         """
         raise NotImplementedError
 
-    def set_at_rest(self, context: Any) -> None:
+    def set_at_rest(self, context: Context) -> None:
         """Make the held pose what all cameras see now without noise.
 
         Args:
@@ -105,7 +103,7 @@ class HeldPose(LeafSystem):
         _record(state, estimate)
         context.SetDiscreteState(state)
 
-    def held_pose(self, context: Any) -> RigidTransform | None:
+    def held_pose(self, context: Context) -> RigidTransform | None:
         """Return the pose X_WP held, or None before the first frame.
 
         Args:
@@ -114,7 +112,7 @@ class HeldPose(LeafSystem):
         state: Array = context.get_discrete_state_vector().CopyToVector()
         return vector_to_pose(state[_POSE]) if state[_FRAMES] > 0.0 else None
 
-    def _update(self, context: Any, discrete: Any) -> None:
+    def _update(self, context: Context, discrete: DiscreteValues) -> None:
         state: Array = context.get_discrete_state_vector().CopyToVector()
         prior = self.held_pose(context)
         estimate = self.measure(context, prior)

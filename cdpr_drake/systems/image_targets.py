@@ -6,6 +6,7 @@ from typing import Any
 
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context
 from pydrake.systems.sensors import ImageRgba8U
 
 from cdpr_drake.errors import GeometryError
@@ -72,7 +73,7 @@ class ImageTargets(HeldPose):
             for i in range(self.num_cameras)
         ]
 
-    def measure(self, context: Any, prior: RigidTransform | None) -> PoseEstimate | None:
+    def measure(self, context: Context, prior: RigidTransform | None) -> PoseEstimate | None:
         """Return the pose that the images show now, or None; see `HeldPose`.
 
         Args:
@@ -81,7 +82,7 @@ class ImageTargets(HeldPose):
         """
         return self._estimate(self.see(context), prior)
 
-    def measure_at_rest(self, context: Any) -> PoseEstimate | None:
+    def measure_at_rest(self, context: Context) -> PoseEstimate | None:
         """Return the pose that all images show now, searched for all over them, or None.
 
         Args:
@@ -89,7 +90,7 @@ class ImageTargets(HeldPose):
         """
         return self._estimate([self._image(context, i) for i in range(self.num_cameras)])
 
-    def see(self, context: Any) -> list[Any]:
+    def see(self, context: Context) -> list[Any]:
         """Return the images now, (height, width, 4) of uint8; None of a camera that fails.
 
         Args:
@@ -98,7 +99,7 @@ class ImageTargets(HeldPose):
         lost = self._outages.at(context.get_time())
         return [None if i in lost else self._image(context, i) for i in range(self.num_cameras)]
 
-    def _image(self, context: Any, camera: int) -> Any:
+    def _image(self, context: Context, camera: int) -> Any:
         image = self._ports[camera].Eval(context).data
         if image.shape[:2] != self._sizes[camera]:
             (height, width), (got, across) = self._sizes[camera], image.shape[:2]

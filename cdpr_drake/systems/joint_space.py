@@ -2,158 +2,127 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.systems.framework import LeafSystem_
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from cdpr_drake.model.inverse_kinematics import InverseKinematics
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, exp_rotation, pose_to_vector
 from cdpr_drake.model.servo import pose_error, servo_twist
-from cdpr_drake.systems._template import chain, check_finite, system_template, value
+from cdpr_drake.systems._template import chain, check_finite, scalar_convertible, seconds, value
 
 
-@system_template("InverseKinematicsAngles")
-def InverseKinematicsAngles_(T: type) -> type:
-    class Impl(LeafSystem_[T]):
-        """Motor angles for a desired pose, by the paper's inverse kinematics (Fig. 9, eq. 8).
+@scalar_convertible
+class InverseKinematicsAngles(LeafSystem):
+    """Motor angles for a desired pose, by the paper's inverse kinematics (Fig. 9, eq. 8).
 
-        .. pydrake_system::
+    .. pydrake_system::
 
-            name: InverseKinematicsAngles
-            input_ports:
-            - desired_pose
-            output_ports:
-            - motor_angles
+        name: InverseKinematicsAngles
+        input_ports:
+        - desired_pose
+        output_ports:
+        - motor_angles
 
-        q = (l_model(pose) + run - l(0)) / r, with horizontal tensions of least norm for the nominal
-        mass (A.2). All models but the ECM know no stretch: that is joint space control's error.
+    q = (l_model(pose) + run - l(0)) / r, with horizontal tensions of least norm for the nominal
+    mass (A.2). All models but the ECM know no stretch: that is joint space control's error.
 
-        desired_pose (6) is [roll, pitch, yaw, x, y, z] (rad, m) of X_WP; motor_angles (k) in rad.
+    desired_pose (6) is [roll, pitch, yaw, x, y, z] (rad, m) of X_WP; motor_angles (k) in rad.
 
-        Args:
-            robot: the robot as the controller believes it.
-            cable_model: "ECM", "CMWE", "SCMWE" or "SLSM".
+    Args:
+        robot: the robot as the controller believes it.
+        cable_model: "ECM", "CMWE", "SCMWE" or "SLSM".
 
-        Raises:
-            GeometryError, TensionError: at evaluation, where no cable tensions hold the platform.
-        """
+    Raises:
+        GeometryError, TensionError: at evaluation, where no cable tensions hold the platform.
+    """
 
-        def _construct(
-            self, robot: CableRobot, cable_model: str = "SCMWE", *, converter: Any = None
-        ) -> None:
-            super().__init__(converter=converter)
-            self.robot, self.cable_model = robot, cable_model
-            self._inverse = InverseKinematics(robot, cable_model)
-            winch = robot.winch
-            self._zero, self._transmission = winch.encoder_zero_length, winch.transmission
-            self._pose_port = self.DeclareVectorInputPort("desired_pose", 6)
-            self.DeclareVectorOutputPort(
-                "motor_angles", robot.num_cables, self._calc_angles, {self._pose_port.ticket()}
-            )
+    def __init__(self, robot: CableRobot, cable_model: str = "SCMWE") -> None:
+        super().__init__()
+        self.robot, self.cable_model = robot, cable_model
+        self._inverse = InverseKinematics(robot, cable_model)
+        winch = robot.winch
+        self._zero, self._transmission = winch.encoder_zero_length, winch.transmission
+        self._pose_port = self.DeclareVectorInputPort("desired_pose", 6)
+        self.DeclareVectorOutputPort(
+            "motor_angles", robot.num_cables, self._calc_angles, {self._pose_port.ticket()}
+        )
 
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, other.robot, other.cable_model, converter=converter)
-
-        def _calc_angles(self, context: Any, output: Any) -> None:
-            pose = self._pose_port.Eval(context)
-            check_finite(value(pose), self, context, "input desired_pose")
-            plain = T is float
-            lengths, jacobian = self._inverse.lengths_and_jacobian(value(pose), not plain)
-            angles = (lengths - self._zero) / self._transmission
-            if not plain:
-                angles = chain(angles, [jacobian / self._transmission], pose)
-            output.SetFromVector(angles)
-
-    return Impl
+    def _calc_angles(self, context: Context, output: BasicVector) -> None:
+        pose = self._pose_port.Eval(context)
+        check_finite(value(pose), self, context, "input desired_pose")
+        plain = not pose.dtype.hasobject
+        lengths, jacobian = self._inverse.lengths_and_jacobian(value(pose), not plain)
+        angles = (lengths - self._zero) / self._transmission
+        if not plain:
+            angles = chain(angles, jacobian / self._transmission, pose)
+        output.SetFromVector(angles)
 
 
-@system_template("ExponentialApproach")
-def ExponentialApproach_(T: type) -> type:
-    class Impl(LeafSystem_[T]):
-        """A desired pose that moves from start to goal as exact visual servoing would move it.
+@scalar_convertible
+class ExponentialApproach(LeafSystem):
+    """A desired pose that moves from start to goal as exact visual servoing would move it.
 
-        .. pydrake_system::
+    .. pydrake_system::
 
-            name: ExponentialApproach
-            output_ports:
-            - desired_pose
-            - desired_twist
+        name: ExponentialApproach
+        output_ports:
+        - desired_pose
+        - desired_twist
 
-        s(t) = s(0) exp(-integral of lambda), the gain lambda rising linearly over the ramp time:
-        the profile of eq. (18), for joint space control, which must not be given a step.
+    s(t) = s(0) exp(-integral of lambda), the gain lambda rising linearly over the ramp time:
+    the profile of eq. (18), for joint space control, which must not be given a step.
 
-        desired_pose (6) is [roll, pitch, yaw, x, y, z] (rad, m) of X_WP; desired_twist (6) is
-        [omega; v] of the platform in W.
+    desired_pose (6) is [roll, pitch, yaw, x, y, z] (rad, m) of X_WP; desired_twist (6) is
+    [omega; v] of the platform in W.
 
-        Args:
-            robot: the robot, for the target frame on its platform.
-            start: X_WP at the start, or [roll, pitch, yaw, x, y, z].
-            goal: X_WP at the goal, in either form.
-            gain: lambda [1/s].
-            ramp_time: time over which the gain rises from zero [s].
-        """
+    Args:
+        robot: the robot, for the target frame on its platform.
+        start: X_WP at the start, or [roll, pitch, yaw, x, y, z].
+        goal: X_WP at the goal, in either form.
+        gain: lambda [1/s].
+        ramp_time: time over which the gain rises from zero [s].
+    """
 
-        def _construct(
-            self,
-            robot: CableRobot,
-            start: RigidTransform | ArrayLike,
-            goal: RigidTransform | ArrayLike,
-            gain: float = 0.1,
-            ramp_time: float = 1.0,
-            *,
-            converter: Any = None,
-        ) -> None:
-            super().__init__(converter=converter)
-            self.robot, self.gain, self.ramp_time = robot, gain, ramp_time
-            self.start, self.goal = as_pose(start), as_pose(goal)
-            self._X_PM = robot.cameras.X_PM
-            self._initial_error = pose_error(self.start, self.goal, self._X_PM)
-            time = {self.time_ticket()}
-            self.DeclareVectorOutputPort("desired_pose", 6, self._calc_pose, time)
-            self.DeclareVectorOutputPort("desired_twist", 6, self._calc_twist, time)
+    def __init__(
+        self,
+        robot: CableRobot,
+        start: RigidTransform | ArrayLike,
+        goal: RigidTransform | ArrayLike,
+        gain: float = 0.1,
+        ramp_time: float = 1.0,
+    ) -> None:
+        super().__init__()
+        self.robot, self.gain, self.ramp_time = robot, gain, ramp_time
+        self.start, self.goal = as_pose(start), as_pose(goal)
+        self._X_PM = robot.cameras.X_PM
+        self._initial_error = pose_error(self.start, self.goal, self._X_PM)
+        time = {self.time_ticket()}
+        self.DeclareVectorOutputPort("desired_pose", 6, self._calc_pose, time)
+        self.DeclareVectorOutputPort("desired_twist", 6, self._calc_twist, time)
 
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(
-                self,
-                other.robot,
-                other.start,
-                other.goal,
-                other.gain,
-                other.ramp_time,
-                converter=converter,
-            )
+    def _error(self, time: float) -> np.ndarray:
+        ramped = min(time, self.ramp_time)
+        spent = time - ramped + (0.5 * ramped**2 / self.ramp_time if self.ramp_time else 0.0)
+        return self._initial_error * np.exp(-self.gain * spent)
 
-        def _error(self, context: Any) -> np.ndarray:
-            time = context.get_time() if T is float else context.get_time().value()
-            ramped = min(time, self.ramp_time)
-            spent = time - ramped + (0.5 * ramped**2 / self.ramp_time if self.ramp_time else 0.0)
-            return self._initial_error * np.exp(-self.gain * spent)
+    def _target(self, error: np.ndarray) -> RigidTransform:
+        """Return X_WM with the goal at `error` from it."""
+        X_MM = RigidTransform(RotationMatrix(exp_rotation(error[:3])), error[3:])
+        return self.goal @ self._X_PM @ X_MM.inverse()
 
-        def _target(self, error: np.ndarray) -> RigidTransform:
-            """Return X_WM with the goal at `error` from it."""
-            X_MM = RigidTransform(RotationMatrix(exp_rotation(error[:3])), error[3:])
-            return self.goal @ self._X_PM @ X_MM.inverse()
+    def _calc_pose(self, context: Context, output: BasicVector) -> None:
+        X_WM = self._target(self._error(seconds(context)))
+        output.SetFromVector(pose_to_vector(X_WM @ self._X_PM.inverse()))
 
-        def _calc_pose(self, context: Any, output: Any) -> None:
-            X_WM = self._target(self._error(context))
-            output.SetFromVector(pose_to_vector(X_WM @ self._X_PM.inverse()))
-
-        def _calc_twist(self, context: Any, output: Any) -> None:
-            time = context.get_time() if T is float else context.get_time().value()
-            gain = self.gain * (min(time / self.ramp_time, 1.0) if self.ramp_time else 1.0)
-            error = self._error(context)
-            R_WM = self._target(error).rotation()
-            tau = servo_twist(error, gain)
-            omega, v_M = R_WM @ tau[:3], R_WM @ tau[3:]
-            p_ME = R_WM @ self._X_PM.inverse().translation()
-            output.SetFromVector(np.concatenate([omega, v_M + np.cross(omega, p_ME)]))
-
-    return Impl
-
-
-InverseKinematicsAngles = InverseKinematicsAngles_[None]
-ExponentialApproach = ExponentialApproach_[None]
+    def _calc_twist(self, context: Context, output: BasicVector) -> None:
+        time = seconds(context)
+        gain = self.gain * (min(time / self.ramp_time, 1.0) if self.ramp_time else 1.0)
+        error = self._error(time)
+        R_WM = self._target(error).rotation()
+        tau = servo_twist(error, gain)
+        omega, v_M = R_WM @ tau[:3], R_WM @ tau[3:]
+        p_ME = R_WM @ self._X_PM.inverse().translation()
+        output.SetFromVector(np.concatenate([omega, v_M + np.cross(omega, p_ME)]))

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from pydrake.common import RandomDistribution
-from pydrake.common.value import Value
-from pydrake.systems.framework import LeafSystem
+from pydrake.common.value import AbstractValue, Value
+from pydrake.systems.framework import Context, LeafSystem
 from pydrake.systems.sensors import ImageRgba8U
 
 from cdpr_drake.errors import GeometryError
 from cdpr_drake.model.vision.cameras import Intrinsics
 from cdpr_drake.model.vision.lens import Lens
-from cdpr_drake.systems._template import GAUSSIAN_INPUT
+from cdpr_drake.systems._template import noise_input
 
 
 class LensDistortion(LeafSystem):
@@ -46,9 +43,7 @@ class LensDistortion(LeafSystem):
         super().__init__()
         self.intrinsics, self.lens = intrinsics, Lens(intrinsics)
         self._image_port = self.DeclareAbstractInputPort("pinhole_image", Value(ImageRgba8U()))
-        self._noise_port = self.DeclareVectorInputPort(
-            GAUSSIAN_INPUT, 1, RandomDistribution.kGaussian
-        )
+        self._noise_port = noise_input(self, 1)
         self.DeclareAbstractOutputPort(
             "image",
             lambda: Value(ImageRgba8U(intrinsics.width, intrinsics.height)),
@@ -56,7 +51,7 @@ class LensDistortion(LeafSystem):
             {self._image_port.ticket(), self._noise_port.ticket()},
         )
 
-    def _calc_image(self, context: Any, output: Any) -> None:
+    def _calc_image(self, context: Context, output: AbstractValue) -> None:
         image, pinhole = self._image_port.Eval(context), self.lens.pinhole
         if (image.width(), image.height()) != (pinhole.width, pinhole.height):
             raise GeometryError(

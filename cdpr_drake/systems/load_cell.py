@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from pydrake.common import RandomDistribution
-from pydrake.systems.framework import LeafSystem_
+from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
 
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.vision.outages import LOAD_CELL, Outage, Outages
 from cdpr_drake.systems._template import (
-    GAUSSIAN_INPUT,
     chain,
     check_finite,
-    system_template,
+    noise_input,
+    scalar_convertible,
+    seconds,
     value,
 )
 
@@ -22,145 +20,124 @@ SINES = 5
 """How many sines make up the cables' vibration."""
 
 
-@system_template("LoadCellFilter")
-def LoadCellFilter_(T: type) -> type:
-    class Impl(LeafSystem_[T]):
-        """Cable tensions as k filtered load cells report them.
+@scalar_convertible
+class LoadCellFilter(LeafSystem):
+    """Cable tensions as k filtered load cells report them.
 
-        .. pydrake_system::
+    .. pydrake_system::
 
-            name: LoadCellFilter
-            input_ports:
-            - tension_at_winch
-            - noise (optional)
-            output_ports:
-            - measured_tension
+        name: LoadCellFilter
+        input_ports:
+        - tension_at_winch
+        - noise (optional)
+        output_ports:
+        - measured_tension
 
-        A cell reads y = gain (T_W + v) + bias + sigma n; the reading, freed of the gain and bias
-        that the controller believes, passes n_f first-order filters in series, dx/dt = 2 pi f_c
-        (y - x) (section 4.2: the noise requires filtering). v is the cables' vibration, a few sines
-        in the robot's band. All ports have size k, in N; noise is standard normal, ignored if the
-        port is left open. State: [filter 1 (k); ...; filter n_f (k)].
+    A cell reads y = gain (T_W + v) + bias + sigma n; the reading, freed of the gain and bias
+    that the controller believes, passes n_f first-order filters in series, dx/dt = 2 pi f_c
+    (y - x) (section 4.2: the noise requires filtering). v is the cables' vibration, a few sines
+    in the robot's band. All ports have size k, in N; noise is standard normal, ignored if the
+    port is left open. State: [filter 1 (k); ...; filter n_f (k)].
+
+    Args:
+        robot: the true robot, for its load cells.
+        calibrated: the robot as the controller believes it; the true one if None.
+        outages: when cells are stuck, which stops their filters too, or dead.
+
+    Attributes:
+        parameters: (4, k), as kernels/load_cell.py takes them.
+
+    Raises:
+        ValueError: an outage of a cell that is not there.
+    """
+
+    def __init__(
+        self,
+        robot: CableRobot,
+        calibrated: CableRobot | None = None,
+        outages: tuple[Outage, ...] = (),
+    ) -> None:
+        super().__init__()
+        self.robot = robot
+        self.calibrated = calibrated if calibrated is not None else robot
+        from cdpr_drake.model.kernels.load_cell import filter_derivatives
+
+        cells, believed = robot.load_cells, self.calibrated.load_cells
+        gain, sigma = cells.gain / believed.gain, cells.noise / believed.gain
+        bias = (cells.bias - believed.bias) / believed.gain
+        rate = np.full(robot.num_cables, 2.0 * np.pi * cells.cutoff)
+        self._filter, self.parameters = filter_derivatives, np.array([gain, bias, sigma, rate])
+        self._order = cells.order
+        k = self._k = robot.num_cables
+        self.outages = tuple(outages)
+        self._outages = Outages(self.outages, LOAD_CELL, k)
+        self._amplitude = cells.vibration_amplitude / np.sqrt(SINES)
+        self._frequencies, self._phases = _vibration(cells.vibration_band, k)
+        self._no_noise = np.zeros(k)
+        state = self.DeclareContinuousState(self._order * k)
+        self._tension_port = self.DeclareVectorInputPort("tension_at_winch", k)
+        self._noise_port = noise_input(self, k)
+        if self._order == 1:
+            self.DeclareStateOutputPort("measured_tension", state)
+        else:
+            self.DeclareVectorOutputPort(
+                "measured_tension", k, self._calc_tension, {self.xc_ticket()}
+            )
+
+    def reading(self, tension_at_winch: np.ndarray) -> np.ndarray:
+        """Return the noiseless reading (k,) [N] for tensions (k,) [N], as the filter gets it.
 
         Args:
-            robot: the true robot, for its load cells.
-            calibrated: the robot as the controller believes it; the true one if None.
-            outages: when cells are stuck, which stops their filters too, or dead.
-
-        Attributes:
-            parameters: (4, k), as kernels/load_cell.py takes them.
-
-        Raises:
-            ValueError: an outage of a cell that is not there.
+            tension_at_winch: (k,) [N].
         """
+        gain, bias, _, _ = self.parameters
+        return gain * tension_at_winch + bias
 
-        def _construct(
-            self,
-            robot: CableRobot,
-            calibrated: CableRobot | None = None,
-            outages: tuple[Outage, ...] = (),
-            *,
-            converter: Any = None,
-        ) -> None:
-            super().__init__(converter=converter)
-            self.robot = robot
-            self.calibrated = calibrated if calibrated is not None else robot
-            from cdpr_drake.model.kernels.load_cell import filter_derivatives
+    def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
+        """Write the derivatives of the state in a context."""
+        x = context.get_continuous_state_vector().CopyToVector()
+        tension, noise = self._tension_port.Eval(context), self._no_noise
+        if self._noise_port.HasValue(context):
+            noise = self._noise_port.Eval(context)
+        if self._amplitude > 0.0:
+            tension = tension + self._vibration(seconds(context))
+        args, xdot = (x, tension, noise), np.empty(x.size)
+        plain = map(value, args) if x.dtype.hasobject else args
+        if not self._filter(*plain, self.parameters, xdot):
+            check_finite(xdot, self, context, "derivatives")
+        if x.dtype.hasobject:
+            xdot = chain(xdot, self._jacobian(), *args)
+        if self._outages:
+            self._fail(seconds(context), x, xdot)
+        derivatives.SetFromVector(xdot)
 
-            cells, believed = robot.load_cells, self.calibrated.load_cells
-            gain, sigma = cells.gain / believed.gain, cells.noise / believed.gain
-            bias = (cells.bias - believed.bias) / believed.gain
-            rate = np.full(robot.num_cables, 2.0 * np.pi * cells.cutoff)
-            self._filter, self.parameters = filter_derivatives, np.array([gain, bias, sigma, rate])
-            self._order = cells.order
-            k = self._k = robot.num_cables
-            self.outages = tuple(outages)
-            self._outages = Outages(self.outages, LOAD_CELL, k)
-            self._amplitude = cells.vibration_amplitude / np.sqrt(SINES)
-            self._frequencies, self._phases = _vibration(cells.vibration_band, k)
-            self._no_noise = np.zeros(k)
-            state = self.DeclareContinuousState(self._order * k)
-            self._tension_port = self.DeclareVectorInputPort("tension_at_winch", k)
-            self._noise_port = self.DeclareVectorInputPort(
-                GAUSSIAN_INPUT, k, RandomDistribution.kGaussian
-            )
-            if self._order == 1:
-                self.DeclareStateOutputPort("measured_tension", state)
+    def _jacobian(self) -> np.ndarray:
+        """Return that of the derivatives by state, tension and noise: all is linear."""
+        gain, _, sigma, rate = self.parameters
+        k, n = self._k, self._k * self._order
+        through = np.eye(n, n, -k) - np.eye(n)
+        first = np.eye(n, k) * rate
+        return np.hstack([rate[0] * through, first * gain, first * sigma])
+
+    def _vibration(self, time: float) -> np.ndarray:
+        """Return the vibration (k,) [N] of the tensions."""
+        return self._amplitude * np.sin(time * self._frequencies + self._phases).sum(axis=1)
+
+    def _fail(self, time: float, x: np.ndarray, xdot: np.ndarray) -> None:
+        """Put what failing cells do into the derivatives; stuck ones keep what they show."""
+        believed, k = self.calibrated.load_cells, self._k
+        for cell, reading in self._outages.at(time).items():
+            if reading is None:
+                xdot[cell::k] = 0.0 * x[cell::k]
             else:
-                self.DeclareVectorOutputPort(
-                    "measured_tension", k, self._calc_tension, {self.xc_ticket()}
-                )
+                y = (reading - believed.bias[cell]) / believed.gain[cell]
+                xdot[cell] = self.parameters[3, cell] * (y - x[cell])
 
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            args = (other.robot, other.calibrated, other.outages)
-            Impl._construct(self, *args, converter=converter)
-
-        def reading(self, tension_at_winch: np.ndarray) -> np.ndarray:
-            """Return the noiseless reading (k,) [N] for tensions (k,) [N], as the filter gets it.
-
-            Args:
-                tension_at_winch: (k,) [N].
-            """
-            gain, bias, _, _ = self.parameters
-            return gain * tension_at_winch + bias
-
-        def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
-            """Write the derivatives of the state in a context."""
-            x = context.get_continuous_state_vector().CopyToVector()
-            tension, noise = self._tension_port.Eval(context), self._no_noise
-            if self._noise_port.HasValue(context):
-                noise = self._noise_port.Eval(context)
-            if self._amplitude > 0.0:
-                tension = tension + self._vibration(_seconds(context))
-            xdot = np.empty(x.size)
-            if T is float:
-                finite = self._filter(x, tension, noise, self.parameters, xdot)
-            else:
-                plain = value(x), value(tension), value(noise)
-                finite = self._filter(*plain, self.parameters, xdot)
-            if not finite:
-                check_finite(xdot, self, context, "derivatives")
-            if T is not float:
-                xdot = chain(xdot, self._jacobians(), x, tension, noise)
-            if self._outages:
-                self._fail(_seconds(context), x, xdot)
-            derivatives.SetFromVector(xdot)
-
-        def _jacobians(self) -> list[np.ndarray]:
-            """Return those of the derivatives by state, tension and noise: all is linear."""
-            gain, _, sigma, rate = self.parameters
-            k, n = self._k, self._k * self._order
-            through = np.eye(n, n, -k) - np.eye(n)
-            return [rate[0] * through, np.eye(n, k) * rate * gain, np.eye(n, k) * rate * sigma]
-
-        def _vibration(self, time: float) -> np.ndarray:
-            """Return the vibration (k,) [N] of the tensions."""
-            return self._amplitude * np.sin(time * self._frequencies + self._phases).sum(axis=1)
-
-        def _fail(self, time: float, x: np.ndarray, xdot: np.ndarray) -> None:
-            """Put what failing cells do into the derivatives; stuck ones keep what they show."""
-            believed, k = self.calibrated.load_cells, self._k
-            for cell, reading in self._outages.at(time).items():
-                if reading is None:
-                    xdot[cell::k] = 0.0 * x[cell::k]
-                else:
-                    y = (reading - believed.bias[cell]) / believed.gain[cell]
-                    xdot[cell] = self.parameters[3, cell] * (y - x[cell])
-
-        def _calc_tension(self, context: Any, output: Any) -> None:
-            output.SetFromVector(context.get_continuous_state_vector().CopyToVector()[-self._k :])
-
-    return Impl
+    def _calc_tension(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(context.get_continuous_state_vector().CopyToVector()[-self._k :])
 
 
 def _vibration(band: np.ndarray, num_cables: int) -> tuple[np.ndarray, np.ndarray]:
     """Return frequencies (SINES,) [rad/s] and phases (k, SINES), always the same."""
     frequencies = 2.0 * np.pi * np.linspace(band[0], band[1], SINES)
     return frequencies, np.random.default_rng(0).uniform(0.0, 2.0 * np.pi, (num_cables, SINES))
-
-
-def _seconds(context: Any) -> float:
-    return float(value(np.array([context.get_time()]))[0])
-
-
-LoadCellFilter = LoadCellFilter_[None]

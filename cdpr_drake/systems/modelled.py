@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy as np
-from pydrake.systems.framework import LeafSystem
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from cdpr_drake.model.modelled import modelled_tangents, modelled_tensions
 from cdpr_drake.model.robot import CableRobot
-from cdpr_drake.systems._template import check_finite
+from cdpr_drake.systems._template import finite_inputs
 
 
 class ModelledTension(LeafSystem):
@@ -37,9 +34,9 @@ class ModelledTension(LeafSystem):
         self._pose_port = self.DeclareVectorInputPort("measured_pose", 6)
         self.DeclareVectorOutputPort("measured_tension", robot.num_cables, self._calc)
 
-    def _calc(self, context: Any, output: Any) -> None:
+    def _calc(self, context: Context, output: BasicVector) -> None:
         pose = self._pose_port.Eval(context)
-        check_finite(pose, self, context, "inputs")
+        finite_inputs(self, context, pose)
         output.SetFromVector(modelled_tensions(self.robot, pose))
 
 
@@ -71,7 +68,7 @@ class ModelledTangents(LeafSystem):
         self._tension_port = self.DeclareVectorInputPort("measured_tension", k)
         self.DeclareVectorOutputPort("measured_tangents", 3 * k, self._calc)
 
-    def _calc(self, context: Any, output: Any) -> None:
+    def _calc(self, context: Context, output: BasicVector) -> None:
         pose, tension = self._pose_port.Eval(context), self._tension_port.Eval(context)
-        check_finite(np.append(pose, tension), self, context, "inputs")
+        finite_inputs(self, context, pose, tension)
         output.SetFromVector(modelled_tangents(self.robot, pose, tension).ravel())

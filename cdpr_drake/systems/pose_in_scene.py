@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from pydrake.common.value import Value
+from pydrake.common.value import AbstractValue, Value
 from pydrake.geometry import FrameId, FramePoseVector
-from pydrake.systems.framework import LeafSystem
+from pydrake.systems.framework import Context, LeafSystem
 
 from cdpr_drake.model.rotations import vector_to_pose
 from cdpr_drake.systems._template import check_finite
@@ -38,7 +36,7 @@ class PoseInScene(LeafSystem):
             "frame_poses", lambda: Value(FramePoseVector()), self._calc_poses, tickets
         )
 
-    def _calc_poses(self, context: Any, output: Any) -> None:
+    def _calc_poses(self, context: Context, output: AbstractValue) -> None:
         pose = self._pose_port.Eval(context)
         check_finite(pose, self, context, "inputs")
         output.get_mutable_value().set_value(self._frame, vector_to_pose(pose))

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from pydrake.common import RandomDistribution
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import LeafSystem
+from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, vector_to_pose
 from cdpr_drake.model.vision.outages import STEREO_PAIR, Outage, Outages
 from cdpr_drake.model.vision.tangents import CableImages, TangentEstimate, TangentEstimator
-from cdpr_drake.systems._template import GAUSSIAN_INPUT, check_finite, part_of_state
+from cdpr_drake.systems._template import check_finite, finite_inputs, noise_input, part_of_state
 
 
 class StereoCameras(LeafSystem):
@@ -52,9 +49,7 @@ class StereoCameras(LeafSystem):
         self._tension_port = self.DeclareVectorInputPort("tension_at_drawing_point", k)
         self._pose_port = self.DeclareVectorInputPort("measured_pose", 6)
         self._measured_tension_port = self.DeclareVectorInputPort("measured_tension", k)
-        self._noise_port = self.DeclareVectorInputPort(
-            GAUSSIAN_INPUT, noise_size, RandomDistribution.kGaussian
-        )
+        self._noise_port = noise_input(self, noise_size)
         self.DeclareDiscreteState(6 * k)
         self.DeclarePeriodicDiscreteUpdateEvent(self.sample_time, 0.0, self._update)
         start = 0
@@ -68,7 +63,7 @@ class StereoCameras(LeafSystem):
             self.DeclareVectorOutputPort(name, size, part, {self.xd_ticket()})
             start += size
 
-    def set_at_rest(self, context: Any) -> None:
+    def set_at_rest(self, context: Context) -> None:
         """Make the held directions what all pairs see now without noise.
 
         Args:
@@ -78,11 +73,11 @@ class StereoCameras(LeafSystem):
         edges = self._edges(context, state, None, set())
         context.SetDiscreteState(self._state(context, state, self._measure(context, edges)))
 
-    def _edges(self, context: Any, state: Array, noise: Array | None, lost: set[int]) -> Array:
+    def _edges(self, context: Context, state: Array, noise: Array | None, lost: set[int]) -> Array:
         """Return what pairs that are not lost see of the edges (k, 2, 2, n, 2) [px]."""
         raise NotImplementedError
 
-    def _noise(self, context: Any) -> Array | None:
+    def _noise(self, context: Context) -> Array | None:
         """Return the noise now, None if the port is left open."""
         if not self._noise_port.HasValue(context):
             return None
@@ -90,29 +85,29 @@ class StereoCameras(LeafSystem):
         check_finite(noise, self, context, "noise")
         return noise
 
-    def _lost(self, context: Any) -> set[int]:
+    def _lost(self, context: Context) -> set[int]:
         """Return the pairs that fail now, by index from 0."""
         return set(self._outages.at(context.get_time()))
 
-    def _cables(self, context: Any) -> tuple[Array, Array]:
+    def _cables(self, context: Context) -> tuple[Array, Array]:
         tangents, tension = self._tangents_port.Eval(context), self._tension_port.Eval(context)
-        check_finite(np.append(tangents, tension), self, context, "inputs")
+        finite_inputs(self, context, tangents, tension)
         return tangents, tension
 
-    def _measured(self, context: Any) -> tuple[Array, RigidTransform]:
+    def _measured(self, context: Context) -> tuple[Array, RigidTransform]:
         tension, pose = self._measured_tension_port.Eval(context), self._pose_port.Eval(context)
-        check_finite(np.append(pose, tension), self, context, "inputs")
+        finite_inputs(self, context, pose, tension)
         return tension, vector_to_pose(pose)
 
-    def _measure(self, context: Any, edges: Array) -> TangentEstimate:
+    def _measure(self, context: Context, edges: Array) -> TangentEstimate:
         return self._estimate(edges, *self._measured(context))
 
-    def _update(self, context: Any, discrete: Any) -> None:
+    def _update(self, context: Context, discrete: DiscreteValues) -> None:
         state = context.get_discrete_state_vector().CopyToVector()
         edges = self._edges(context, state, self._noise(context), self._lost(context))
         discrete.set_value(self._state(context, state, self._measure(context, edges)))
 
-    def _state(self, context: Any, state: Array, estimate: TangentEstimate) -> Array:
+    def _state(self, context: Context, state: Array, estimate: TangentEstimate) -> Array:
         """Return the state after an estimate, what is not valid in it held from the state before.
 
         A cable that was never seen is taken for straight.
@@ -180,7 +175,7 @@ class StereoTangentCameras(StereoCameras):
         self._images = CableImages(robot)
         super().__init__(robot, calibrated, sample_time, outages, self._images.noise_size)
 
-    def see(self, context: Any) -> Array:
+    def see(self, context: Context) -> Array:
         """Return the images (k, 2, 2, n, 2) [px] of the cables now, NaN where not seen.
 
         Args:
@@ -188,7 +183,7 @@ class StereoTangentCameras(StereoCameras):
         """
         return self._edges(context, np.empty(0), self._noise(context), self._lost(context))
 
-    def _edges(self, context: Any, state: Array, noise: Array | None, lost: set[int]) -> Array:
+    def _edges(self, context: Context, state: Array, noise: Array | None, lost: set[int]) -> Array:
         images = self._images(*self._cables(context), noise)
         images[np.isin(self._images.pairs, list(lost))] = np.nan
         return images

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+from pydrake.systems.framework import Context
 
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array
@@ -63,7 +62,7 @@ class StereoImageCameras(StereoCameras):
         self._draw = drawing if drawing is not None else CableDrawing(robot)
         self._detect = CableLines(self.calibrated)
 
-    def see(self, context: Any) -> list[StereoImage | None]:
+    def see(self, context: Context) -> list[StereoImage | None]:
         """Return the left and right image of each pair now, None for a pair that delivers none.
 
         Args:
@@ -71,12 +70,14 @@ class StereoImageCameras(StereoCameras):
         """
         return self._take(context, self._noise(context), self._lost(context))
 
-    def _take(self, context: Any, noise: Array | None, lost: set[int]) -> list[StereoImage | None]:
+    def _take(
+        self, context: Context, noise: Array | None, lost: set[int]
+    ) -> list[StereoImage | None]:
         seed = None if noise is None else int(np.asarray(noise, float).view(np.uint64)[0])
         images = self._draw(*self._cables(context), seed)
         return [None if pair in lost else both for pair, both in enumerate(images)]
 
-    def _edges(self, context: Any, state: Array, noise: Array | None, lost: set[int]) -> Array:
+    def _edges(self, context: Context, state: Array, noise: Array | None, lost: set[int]) -> Array:
         tension, X_WP = self._measured(context)
         images = self._take(context, noise, lost)
         k = self._k

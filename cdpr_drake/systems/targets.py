@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from pydrake.common import RandomDistribution
 from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context
 
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import vector_to_pose
 from cdpr_drake.model.vision.outages import POSE_CAMERA, Outage, Outages
 from cdpr_drake.model.vision.pose import PoseEstimate, PoseEstimator
 from cdpr_drake.model.vision.targets import Sightings, TargetImages
-from cdpr_drake.systems._template import GAUSSIAN_INPUT, check_finite
+from cdpr_drake.systems._template import check_finite, noise_input
 from cdpr_drake.systems.held_pose import HeldPose
 
 
@@ -76,11 +74,9 @@ class TargetCameras(HeldPose):
         self._estimate = PoseEstimator(self.calibrated, estimator)
         self._outages = Outages(outages, POSE_CAMERA, self.num_cameras)
         self._pose_port = self.DeclareVectorInputPort("pose", 6)
-        self._noise_port = self.DeclareVectorInputPort(
-            GAUSSIAN_INPUT, self._images.noise_size, RandomDistribution.kGaussian
-        )
+        self._noise_port = noise_input(self, self._images.noise_size)
 
-    def measure(self, context: Any, prior: RigidTransform | None) -> PoseEstimate | None:
+    def measure(self, context: Context, prior: RigidTransform | None) -> PoseEstimate | None:
         """Return the pose that the points seen now give, or None; see `HeldPose`.
 
         Args:
@@ -89,7 +85,7 @@ class TargetCameras(HeldPose):
         """
         return self._estimate(self.see(context), prior)
 
-    def measure_at_rest(self, context: Any) -> PoseEstimate | None:
+    def measure_at_rest(self, context: Context) -> PoseEstimate | None:
         """Return the pose that all cameras show now without noise, or None.
 
         Args:
@@ -97,7 +93,7 @@ class TargetCameras(HeldPose):
         """
         return self._estimate(self._images(vector_to_pose(self._pose_port.Eval(context))))
 
-    def see(self, context: Any) -> Sightings:
+    def see(self, context: Context) -> Sightings:
         """Return what the cameras see now.
 
         Args:

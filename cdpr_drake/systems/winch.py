@@ -2,130 +2,116 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from pydrake.systems.framework import LeafSystem_
+from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
 
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.winch import WinchModel
-from cdpr_drake.systems._template import chain, check_finite, system_template, value
+from cdpr_drake.systems._template import check_finite, lift, scalar_convertible, value
 
 
-@system_template("WinchDynamics")
-def WinchDynamics_(T: type) -> type:
-    class Impl(LeafSystem_[T]):
-        """k winches whose motors follow desired angles under PID control (Fig. 9).
+@scalar_convertible
+class WinchDynamics(LeafSystem):
+    """k winches whose motors follow desired angles under PID control (Fig. 9).
 
-        .. pydrake_system::
+    .. pydrake_system::
 
-            name: WinchDynamics
-            input_ports:
-            - desired_motor_angle
-            - tension_at_drawing_point
-            output_ports:
-            - unstrained_length
-            - unstrained_length_rate
-            - motor_angle
-            - motor_rate
-            - motor_torque
-            - tension_at_winch
-            - state
+        name: WinchDynamics
+        input_ports:
+        - desired_motor_angle
+        - tension_at_drawing_point
+        output_ports:
+        - unstrained_length
+        - unstrained_length_rate
+        - motor_angle
+        - motor_rate
+        - motor_torque
+        - tension_at_winch
+        - state
 
-        J d2q/dt2 = tau + r T_W - b dq/dt - tau_c tanh(dq/dt / v_s), with tau = Kp (q_d - q) + Ki
-        integral(q_d - q) - Kd dq/dt within the torque limit, the integral held while it would push
-        the torque further out; l = l(0) + r q, q > 0 pays out; T_W = T_A exp(-mu theta tanh(dl/dt /
-        v_l)). Friction and capstan are off by default; both are stiff when their speeds are small.
+    J d2q/dt2 = tau + r T_W - b dq/dt - tau_c tanh(dq/dt / v_s), with tau = Kp (q_d - q) + Ki
+    integral(q_d - q) - Kd dq/dt within the torque limit, the integral held while it would push
+    the torque further out; l = l(0) + r q, q > 0 pays out; T_W = T_A exp(-mu theta tanh(dl/dt /
+    v_l)). Friction and capstan are off by default; both are stiff when their speeds are small.
 
-        All ports but state have size k: angles in rad, unstrained length in m with the run from
-        drum to eyelet, torque in N m, tensions in N. State, and the port of that name (3 k):
-        [angle (k); rate (k); integral (k)].
+    All ports but state have size k: angles in rad, unstrained length in m with the run from
+    drum to eyelet, torque in N m, tensions in N. State, and the port of that name (3 k):
+    [angle (k); rate (k); integral (k)].
 
-        Args:
-            robot: the robot, for its winch.
-        """
+    Args:
+        robot: the robot, for its winch.
+    """
 
-        def _construct(self, robot: CableRobot, *, converter: Any = None) -> None:
-            super().__init__(converter=converter)
-            self.robot = robot
-            self._model = WinchModel(robot)
-            self._transmission = robot.winch.transmission
-            self._zero_length = robot.winch.encoder_zero_length
-            self._capstan = robot.winch.capstan_exponent > 0.0
-            k = self._k = robot.num_cables
-            state = self.DeclareContinuousState(k, k, k)
-            self._desired_port = self.DeclareVectorInputPort("desired_motor_angle", k)
-            self._tension_port = self.DeclareVectorInputPort("tension_at_drawing_point", k)
-            own = {self.xc_ticket()}
-            for name, calc in (
-                ("unstrained_length", self._calc_length),
-                ("unstrained_length_rate", self._calc_length_rate),
-                ("motor_angle", self._calc_angle),
-                ("motor_rate", self._calc_rate),
-            ):
-                self.DeclareVectorOutputPort(name, k, calc, own)
-            self.DeclareVectorOutputPort(
-                "motor_torque", k, self._calc_torque, own | {self._desired_port.ticket()}
-            )
-            self.DeclareVectorOutputPort(
-                "tension_at_winch", k, self._calc_tension, own | {self._tension_port.ticket()}
-            )
-            self._state_port = self.DeclareStateOutputPort("state", state)
+    def __init__(self, robot: CableRobot) -> None:
+        super().__init__()
+        self.robot = robot
+        self._model = WinchModel(robot)
+        self._transmission = robot.winch.transmission
+        self._zero_length = robot.winch.encoder_zero_length
+        self._capstan = robot.winch.capstan_exponent > 0.0
+        k = self._k = robot.num_cables
+        state = self.DeclareContinuousState(k, k, k)
+        self._desired_port = self.DeclareVectorInputPort("desired_motor_angle", k)
+        self._tension_port = self.DeclareVectorInputPort("tension_at_drawing_point", k)
+        own = {self.xc_ticket()}
+        for name, calc in (
+            ("unstrained_length", self._calc_length),
+            ("unstrained_length_rate", self._calc_length_rate),
+            ("motor_angle", self._calc_angle),
+            ("motor_rate", self._calc_rate),
+        ):
+            self.DeclareVectorOutputPort(name, k, calc, own)
+        self.DeclareVectorOutputPort(
+            "motor_torque", k, self._calc_torque, own | {self._desired_port.ticket()}
+        )
+        self.DeclareVectorOutputPort(
+            "tension_at_winch", k, self._calc_tension, own | {self._tension_port.ticket()}
+        )
+        self._state_port = self.DeclareStateOutputPort("state", state)
 
-        def _construct_copy(self, other: Any, converter: Any = None) -> None:
-            Impl._construct(self, other.robot, converter=converter)
+    def _state(self, context: Context) -> np.ndarray:
+        return context.get_continuous_state_vector().CopyToVector()
 
-        def _state(self, context: Any) -> np.ndarray:
-            return context.get_continuous_state_vector().CopyToVector()
+    def _evaluate(self, x: np.ndarray, desired: np.ndarray, tension: np.ndarray) -> np.ndarray:
+        """Return [derivative (3 k); torque (k); tension at the winch (k)]."""
+        args = x, desired, tension
+        return lift(self._model, tuple(map(value, args)), *args)
 
-        def _evaluate(self, x: np.ndarray, desired: np.ndarray, tension: np.ndarray) -> np.ndarray:
-            """Return [derivative (3 k); torque (k); tension at the winch (k)]."""
-            if T is float:
-                return self._model(x, desired, tension)
-            k = self._k
-            y, jacobian = self._model.with_jacobian(value(x), value(desired), value(tension))
-            return chain(y, np.split(jacobian, [3 * k, 4 * k], axis=1), x, desired, tension)
+    def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
+        """Write the derivatives of the state in a context."""
+        x = self._state_port.Eval(context)
+        desired, tension = self._desired_port.Eval(context), self._tension_port.Eval(context)
+        if not x.dtype.hasobject:
+            xdot, finite = self._model.derivatives(x, desired, tension)
+        else:
+            xdot, finite = self._evaluate(x, desired, tension)[: 3 * self._k], False
+        if not finite:
+            check_finite(value(xdot), self, context, "derivatives")
+        derivatives.SetFromVector(xdot)
 
-        def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
-            """Write the derivatives of the state in a context."""
-            x = self._state_port.Eval(context)
-            desired, tension = self._desired_port.Eval(context), self._tension_port.Eval(context)
-            if T is float:
-                xdot, finite = self._model.derivatives(x, desired, tension)
-            else:
-                xdot, finite = self._evaluate(x, desired, tension)[: 3 * self._k], False
-            if not finite:
-                check_finite(value(xdot), self, context, "derivatives")
-            derivatives.SetFromVector(xdot)
+    def _calc_length(self, context: Context, output: BasicVector) -> None:
+        angle = self._state(context)[: self._k]
+        output.SetFromVector(self._zero_length + self._transmission * angle)
 
-        def _calc_length(self, context: Any, output: Any) -> None:
-            angle = self._state(context)[: self._k]
-            output.SetFromVector(self._zero_length + self._transmission * angle)
+    def _calc_length_rate(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._transmission * self._state(context)[self._k : 2 * self._k])
 
-        def _calc_length_rate(self, context: Any, output: Any) -> None:
-            output.SetFromVector(self._transmission * self._state(context)[self._k : 2 * self._k])
+    def _calc_angle(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._state(context)[: self._k])
 
-        def _calc_angle(self, context: Any, output: Any) -> None:
-            output.SetFromVector(self._state(context)[: self._k])
+    def _calc_rate(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._state(context)[self._k : 2 * self._k])
 
-        def _calc_rate(self, context: Any, output: Any) -> None:
-            output.SetFromVector(self._state(context)[self._k : 2 * self._k])
+    def _calc_torque(self, context: Context, output: BasicVector) -> None:
+        desired = self._desired_port.Eval(context)
+        y = self._evaluate(self._state(context), desired, np.zeros(self._k))
+        torque = y[3 * self._k : 4 * self._k]
+        check_finite(value(torque), self, context, "motor torque")
+        output.SetFromVector(torque)
 
-        def _calc_torque(self, context: Any, output: Any) -> None:
-            desired = self._desired_port.Eval(context)
-            y = self._evaluate(self._state(context), desired, np.zeros(self._k))
-            torque = y[3 * self._k : 4 * self._k]
-            check_finite(value(torque), self, context, "motor torque")
-            output.SetFromVector(torque)
-
-        def _calc_tension(self, context: Any, output: Any) -> None:
-            tension = self._tension_port.Eval(context)
-            check_finite(value(tension), self, context, "input tension_at_drawing_point")
-            if self._capstan:
-                tension = self._evaluate(self._state(context), np.zeros(self._k), tension)
-            output.SetFromVector(tension[-self._k :])
-
-    return Impl
-
-
-WinchDynamics = WinchDynamics_[None]
+    def _calc_tension(self, context: Context, output: BasicVector) -> None:
+        tension = self._tension_port.Eval(context)
+        check_finite(value(tension), self, context, "input tension_at_drawing_point")
+        if self._capstan:
+            tension = self._evaluate(self._state(context), np.zeros(self._k), tension)
+        output.SetFromVector(tension[-self._k :])
