@@ -28,6 +28,8 @@ class WinchModel:
         w = robot.winch
         self._evaluate = kernel.winch_derivatives
         self.num_cables = robot.num_cables
+        self._transmission = w.transmission
+        self._proportional_gain, self._integral_gain = w.proportional_gain, w.integral_gain
         self.parameters = np.array(
             [
                 w.inertia,
@@ -57,6 +59,23 @@ class WinchModel:
         out = np.empty(5 * k, state.dtype)
         self._evaluate(state, desired, T_A, self.parameters, out)
         return out
+
+    def at_rest(self, angle: Array, T_A: Array) -> tuple[Array, Array]:
+        """Return the state (3 k) and the desired angles (k) [rad] with which the winches rest.
+
+        The motors hold the torque - r T_A: by their integrals, or, if the PID has none, by angles
+        that differ from the desired ones.
+
+        Args:
+            angle: (k,) motor angles [rad].
+            T_A: (k,) tensions at the drawing points [N].
+        """
+        hold, integral, desired = self._transmission * T_A, np.zeros(angle.size), angle.copy()
+        if self._integral_gain > 0.0:
+            integral = -hold / self._integral_gain
+        elif self._proportional_gain > 0.0:
+            desired = angle - hold / self._proportional_gain
+        return np.concatenate([angle, np.zeros(angle.size), integral]), desired
 
     def derivatives(self, state: Array, desired: Array, T_A: Array) -> tuple[Array, bool]:
         """Return the derivative of the state (3 k) alone, and whether it is finite.
