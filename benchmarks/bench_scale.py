@@ -24,7 +24,7 @@ from benchmarks.harness import Contestant, Report, Spread, interleave, positive,
 from cdpr_drake.diagrams import make_cable_robot, rest_context
 from cdpr_drake.experiments.runs import run as run_setup
 from cdpr_drake.experiments.runs import setup_of_test
-from cdpr_drake.model.arrays import robot_arrays
+from cdpr_drake.model.arrays import RobotArrays
 from cdpr_drake.model.equilibrium import rest_state
 from cdpr_drake.model.kernels import jit
 from cdpr_drake.model.kernels.platform import platform_cable_forces
@@ -79,7 +79,7 @@ def kernel_calls(robot: CableRobot, calls: int) -> Callable[[], None]:
     generator = np.random.default_rng(0)
     states = state + generator.normal(0.0, 1e-4, (calls, 12))
     lengths = rest.unstrained_length + generator.normal(0.0, 1e-4, (calls, k))
-    points, constants = robot_arrays(robot)[:2]
+    points, constants = RobotArrays(robot).cables
     rate, packed = np.zeros(k), np.zeros(6 + 9 * k)
     return lambda: at_all(states, lengths, rate, points, constants, packed)
 

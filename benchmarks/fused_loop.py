@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.solve_ivp_loop import Loop, Noise, Start
-from cdpr_drake.model.arrays import robot_arrays
+from cdpr_drake.model.arrays import RobotArrays
 from cdpr_drake.model.cable_models import cable_model_index
 from cdpr_drake.model.kernels import jit
 from cdpr_drake.model.kernels.camera import measured_pose
@@ -124,7 +124,7 @@ class FusedLoop:
             raise ValueError("one filter, no vibration")
         self.robot, self.loop = robot, loop
         k = robot.num_cables
-        arrays = robot_arrays(robot)
+        arrays = RobotArrays(robot)
         # What the package's own plant takes: platform, winches, load cells without error.
         self.numbers = FusedPlant(robot, robot).numbers
         self.transforms = (
@@ -134,7 +134,8 @@ class FusedLoop:
         )
         self.law = (
             cable_model_index("SCMWE"), 4, np.array([np.inf, np.inf]), arrays.points, arrays.body,
-            arrays.stiffness, np.zeros(k), arrays.target, 0.5 * cable.min_tension, cable.max_tension,
+            arrays.stiffness, np.zeros(k), arrays.target,
+            0.5 * cable.min_tension, cable.max_tension,
         )  # fmt: skip
         self.sigmas = np.array(
             [cameras.orientation_noise, cameras.position_noise, cameras.tangent_noise]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import cached_property
 
 import numpy as np
 
@@ -10,23 +10,41 @@ from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array
 
 
-class RobotArrays(NamedTuple):
-    """A robot in numbers, each array contiguous and the reader's own.
+class RobotArrays:
+    """A robot in numbers, each array contiguous and packed when first asked for.
 
-    Attributes:
-        points: (2, k, 3) [m] p_WA, where the cables leave the frame, and p_PB.
-        constants: (6 + k,) weight w [N/m]; stiffness (3); damping time [s]; breaking load [N]; runs
-            from drum to eyelet (k) [m].
-        body: (5,) weight m g [N], p_PG [m] and w [N/m].
-        target: (4, 3) orientation R_PM of the target frame, and p_PM [m].
-        solid: (8, 3) [mass, gravity, 0]; p_PG; inertia about G in P; its inverse.
+    Args:
+        robot: the robot.
     """
 
-    points: Array
-    constants: Array
-    body: Array
-    target: Array
-    solid: Array
+    def __init__(self, robot: CableRobot) -> None:
+        self.robot = robot
+
+    @cached_property
+    def points(self) -> Array:
+        """Where the cables leave the frame, p_WA, and where they attach, p_PB: (2, k, 3) [m]."""
+        return np.array([self.robot.drawing_points, self.robot.attachment_points], float)
+
+    @cached_property
+    def constants(self) -> Array:
+        """Those of the cables, (6 + k,).
+
+        Weight w [N/m]; stiffness (3); damping time [s]; breaking load [N]; runs from drum to eyelet
+        (k) [m].
+        """
+        cable = self.robot.cable
+        law = [*cable.stiffness.as_array(), cable.damping_time, cable.breaking_load]
+        return np.array([self.robot.weight_per_metre, *law, *cable.drum_run], float)
+
+    @property
+    def cables(self) -> tuple[Array, Array]:
+        """What the kernels of moving cables take: points and constants."""
+        return self.points, self.constants
+
+    @property
+    def at_rest(self) -> tuple[Array, Array, Array]:
+        """What the kernels of equilibria take: points, constants and body."""
+        return self.points, self.constants, self.body
 
     @property
     def stiffness(self) -> Array:
@@ -35,24 +53,26 @@ class RobotArrays(NamedTuple):
 
     @property
     def run(self) -> Array:
-        """The geometric lengths from drum to eyelet (k,) [m]."""
+        """The runs from drum to eyelet, unstretched, (k,) [m]."""
         return self.constants[6:]
 
+    @cached_property
+    def body(self) -> Array:
+        """Weight m g [N] of the platform, p_PG [m], and weight w of the cables [N/m], (5,)."""
+        robot = self.robot
+        weight = robot.mass * robot.gravity
+        return np.array([weight, *robot.center_of_mass, robot.weight_per_metre])
 
-def robot_arrays(robot: CableRobot) -> RobotArrays:
-    """Return a robot as the kernels take it.
+    @cached_property
+    def target(self) -> Array:
+        """Orientation R_PM of the target frame, and p_PM [m], (4, 3)."""
+        X_PM = self.robot.cameras.X_PM
+        return np.vstack([X_PM.rotation().matrix(), X_PM.translation()])
 
-    Args:
-        robot: the robot.
-    """
-    cable, X_PM, w = robot.cable, robot.cameras.X_PM, robot.weight_per_metre
-    law = [w, *cable.stiffness.as_array(), cable.damping_time, cable.breaking_load]
-    inertia = np.array(robot.inertia, float)
-    scalars = [robot.mass, robot.gravity, 0.0]
-    return RobotArrays(
-        points=np.array([robot.drawing_points, robot.attachment_points], float),
-        constants=np.array([*law, *cable.drum_run], float),
-        body=np.array([robot.mass * robot.gravity, *robot.center_of_mass, w]),
-        target=np.vstack([X_PM.rotation().matrix(), X_PM.translation()]),
-        solid=np.vstack([scalars, robot.center_of_mass, inertia, np.linalg.inv(inertia)]),
-    )
+    @cached_property
+    def solid(self) -> Array:
+        """Of the platform (8, 3): [mass, gravity, 0]; p_PG; inertia about G in P; its inverse."""
+        robot = self.robot
+        inertia = np.array(robot.inertia, float)
+        scalars = [robot.mass, robot.gravity, 0.0]
+        return np.vstack([scalars, robot.center_of_mass, inertia, np.linalg.inv(inertia)])

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from cdpr_drake.errors import EquilibriumError
-from cdpr_drake.model.arrays import robot_arrays
+from cdpr_drake.model.arrays import RobotArrays
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, rpy_rate_matrix, skew
 
@@ -43,14 +43,14 @@ class CableSet:
     """
 
     def __init__(self, robot: CableRobot) -> None:
-        from cdpr_drake.model.kernels.platform import platform_cable_forces
+        from cdpr_drake.model.kernels import catenary, geometry, platform
 
-        self._forces = platform_cable_forces
+        self._catenary, self._geometry, self._platform = catenary, geometry, platform
         self.robot = robot
         self.num_cables = robot.num_cables
         self._size = sum(packed_sizes(robot.num_cables).values())
-        self.arrays = robot_arrays(robot)
-        self.numbers = self.arrays[:2]
+        self.arrays = RobotArrays(robot)
+        self.numbers = self.arrays.cables
 
     def __call__(self, state: Array, length: Array, rate: Array) -> tuple[Array, int]:
         """Return the packed result (6 + 9 k,), its parts as in `packed_sizes`, and a status.
@@ -64,7 +64,8 @@ class CableSet:
             rate: (k,) their rates [m/s].
         """
         packed = np.empty(self._size)
-        return packed, self._forces(state, length, rate, *self.numbers, packed)
+        status = self._platform.platform_cable_forces(state, length, rate, *self.numbers, packed)
+        return packed, status
 
     def with_jacobian(self, state: Array, length: Array, rate: Array) -> tuple[Array, int, Array]:
         """Return the packed result, the status, and the Jacobian (6 + 9 k, 12 + 2 k).
@@ -77,9 +78,6 @@ class CableSet:
             length: (k,) total unstrained lengths [m].
             rate: (k,) their rates [m/s].
         """
-        from cdpr_drake.model.kernels.catenary import cable_forces_jacobian
-        from cdpr_drake.model.kernels.geometry import attachment_motion
-
         k = self.num_cables
         packed, status = self(state, length, rate)
         if status:
@@ -87,9 +85,9 @@ class CableSet:
         (drawing, attachment), constants = self.numbers
         p_WB, v_WB = np.empty((k, 3)), np.empty((k, 3))
         R = RollPitchYaw(state[:3]).ToRotationMatrix().matrix()
-        attachment_motion(R, *state[3:].reshape(3, 3), attachment, p_WB, v_WB)
+        self._geometry.attachment_motion(R, *state[3:].reshape(3, 3), attachment, p_WB, v_WB)
         out, local = np.empty((k, WIDTH)), np.zeros((k, WIDTH, 8))
-        cable_forces_jacobian(
+        self._catenary.cable_forces_jacobian(
             drawing, p_WB, v_WB, length, rate, constants[0], self.arrays.stiffness,
             self.arrays.run, constants[4], out, local,
         )  # fmt: skip
@@ -128,8 +126,8 @@ class CableSet:
         out, jacobian = np.zeros((self.num_cables, WIDTH)), np.zeros((self.num_cables, WIDTH, 8))
         wrench, stiffness = np.zeros(6), np.zeros((6, 6))
         status = balance(
-            *pose_arrays(X_WP), np.array(length, float), *self.arrays[:3], out, jacobian, wrench,
-            stiffness,
+            *pose_arrays(X_WP), np.array(length, float), *self.arrays.at_rest,
+            out, jacobian, wrench, stiffness,
         )  # fmt: skip
         if status:
             raise EquilibriumError(f"cable {status} has no catenary at this pose and length")

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.errors import EquilibriumError
-from cdpr_drake.model.arrays import robot_arrays
+from cdpr_drake.model.arrays import RobotArrays
 from cdpr_drake.model.cables import CableSet, pose_arrays
 from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.robot import CableRobot
@@ -160,7 +160,7 @@ def forward_kinematics(
     R, p = pose_arrays(as_pose(guess))
     out, jacobian, wrench = np.zeros((k, 14)), np.zeros((k, 14, 8)), np.zeros(6)
     status, residual = find_equilibrium(
-        R, p, length, *robot_arrays(robot)[:3], TOLERANCE, max_iterations, out, jacobian, wrench
+        R, p, length, *RobotArrays(robot).at_rest, TOLERANCE, max_iterations, out, jacobian, wrench
     )
     if status:
         raise EquilibriumError(f"cable {status} has no catenary at this pose and length")

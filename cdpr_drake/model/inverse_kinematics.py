@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import GeometryError, TensionError
-from cdpr_drake.model.arrays import robot_arrays
+from cdpr_drake.model.arrays import RobotArrays
 from cdpr_drake.model.cable_models import cable_model_index
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, as_pose, pose_to_vector
@@ -33,7 +33,7 @@ class InverseKinematics:
 
         self.robot, self._kernel = robot, kernel
         self._head = (cable_model_index(cable_model), order)
-        arrays = robot_arrays(robot)
+        arrays = RobotArrays(robot)
         self._robot_arrays = (arrays.points, arrays.body, arrays.stiffness)
 
     def lengths(self, pose: RigidTransform | ArrayLike) -> Array:

@@ -42,7 +42,7 @@ import math
 
 import numpy as np
 
-from cdpr_drake.model.arrays import robot_arrays
+from cdpr_drake.model.arrays import RobotArrays
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array
 
@@ -119,7 +119,7 @@ class CellJudge:
         rules = [LOW * least, HIGH * least, robot.cable.max_tension]
         rules += [DEVIATIONS * reading_deviation(robot), LOAD, TRUST, FLOOR, radius or 1.0, RISE]
         rules += [STILL * least, 1.0 / math.ceil(HANDOVER / sample_time)]
-        arrays = robot_arrays(robot)
+        arrays = RobotArrays(robot)
         self._arrays = (arrays.points, arrays.body, np.array(rules))
         self.healthy = np.zeros(3 * self._k)
 

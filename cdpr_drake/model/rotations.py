@@ -34,16 +34,10 @@ def numbers(a: ArrayLike) -> Array:
 def skew(a: ArrayLike) -> Array:
     """Return the cross-product matrix [a]x of a 3-vector `a`, or of each row of an (n, 3) array."""
     a = numbers(a)
-    x, y, z = a[..., 0], a[..., 1], a[..., 2]
-    zero = np.zeros(a.shape[:-1])
-    return np.stack(
-        [
-            np.stack([zero, -z, y], -1),
-            np.stack([z, zero, -x], -1),
-            np.stack([-y, x, zero], -1),
-        ],
-        -2,
-    )
+    S = np.full((*a.shape, 3), 0.0, a.dtype)
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        S[..., j, i], S[..., i, j] = a[..., k], -a[..., k]
+    return S
 
 
 def exp_rotation(rotation_vector: ArrayLike) -> Array:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import GeometryError
-from cdpr_drake.model.arrays import robot_arrays
+from cdpr_drake.model.arrays import RobotArrays
 from cdpr_drake.model.cable_models import cable_angles, cable_model_index
 from cdpr_drake.model.kinematics import D_t, cable_geometry
 from cdpr_drake.model.robot import CableRobot
@@ -140,7 +140,7 @@ class MotorRateLaw:
         self._head = (cable_model_index(settings.cable_model), settings.order)
         self._limits = np.array([settings.max_speed, settings.max_angular_speed])
         known = _known(robot, settings.model_drum_run)
-        self._robot_arrays = (*known, robot_arrays(robot).target)
+        self._robot_arrays = (*known, RobotArrays(robot).target)
 
     def __call__(self, z: Array, gain: float) -> Array:
         """Return [motor rates; s] (k + 6,) for the input `z` (18 + 4 k,) and `gain` [1/s]."""
@@ -179,7 +179,7 @@ class PoseErrorMap:
         from cdpr_drake.model.kernels import servo as kernel
 
         self._kernel = kernel
-        self._target = robot_arrays(robot).target
+        self._target = RobotArrays(robot).target
 
     def __call__(self, z: Array) -> Array:
         """Return s = [s_w; s_t] (6,) for `z` (12,), both poses as [rpy, xyz] (rad, m)."""
@@ -196,7 +196,7 @@ class PoseErrorMap:
 
 def _known(robot: CableRobot, model_drum_run: bool) -> tuple[Array, Array, Array, Array]:
     """Return points, body, stiffness and run, as the law's kernels take them."""
-    arrays = robot_arrays(robot)
+    arrays = RobotArrays(robot)
     run = arrays.run if model_drum_run else np.zeros(robot.num_cables)
     return arrays.points, arrays.body, arrays.stiffness, run
 

@@ -32,7 +32,8 @@ def wrench_at(arm: Array, force: Array) -> Array:
         arm: (..., 3) [m] from the platform's origin to where the force acts.
         force: (..., 3) [N], or one for all arms.
     """
-    return np.concatenate([np.cross(arm, force), np.broadcast_to(force, arm.shape)], axis=-1)
+    torque = np.cross(arm, force)
+    return np.concatenate([torque, force if force.ndim == arm.ndim else 0.0 * arm + force], axis=-1)
 
 
 def wrench_matrix(geometry: CableGeometry) -> Array:
