@@ -95,7 +95,7 @@ def joint_space_rest(
     for _ in range(20):
         deflection = MM_PER_KN * structure.post_compliance * _pull_on_posts(robot, rest)
         points = believed.drawing_points + deflection
-        moved = np.abs(points - robot.drawing_points).max()
+        moved = np.abs(robot.drawing_points - points).max()
         robot = robot.replace(drawing_points=points)
         rest = forward_kinematics(robot, length, rest.X_WP)
         if moved < 3e-6:

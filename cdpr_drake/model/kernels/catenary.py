@@ -51,7 +51,7 @@ from __future__ import annotations
 import math
 
 from cdpr_drake.model.kernels import jit
-from cdpr_drake.model.kernels.geometry import chord
+from cdpr_drake.model.kernels.geometry import chord, vector
 
 MAX_ITERATIONS = 40
 # Vertical cables: the plane of the cable is undefined at Bx = 0, so Bx is kept above this times L.
@@ -469,8 +469,7 @@ def solve_catenary(Bx, Bz, l0, w, EA):
 @jit
 def _leaning_chord(i, p_WA, p_WB):
     """Return (dx, dy, Bz, Bx, L) of cable i; a vertical cable leans a little towards +x."""
-    b = (float(p_WB[i, 0]), float(p_WB[i, 1]), float(p_WB[i, 2]))
-    dx, dy, Bz = chord(i, p_WA, b)
+    dx, dy, Bz = chord(i, p_WA, vector(p_WB[i]))
     Bx = math.sqrt(dx * dx + dy * dy)
     lean = MIN_LEAN * abs(Bz)
     if Bx < lean:

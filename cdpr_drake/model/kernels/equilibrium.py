@@ -16,7 +16,7 @@ import numpy as np
 
 from cdpr_drake.model.kernels import jit
 from cdpr_drake.model.kernels.catenary import cable_forces_jacobian
-from cdpr_drake.model.kernels.geometry import attachment_motion, cross, turned
+from cdpr_drake.model.kernels.geometry import attachment_motion, cross, turned, vector
 
 MAX_ROTATION = 0.3  # of one step [rad]
 MAX_TRANSLATION = 1.0  # of one step [m]
@@ -57,21 +57,22 @@ def balance(R, p, length, points, constants, body, out, jacobian, wrench, stiffn
     if status:
         return status
     weight = float(body[0])
-    Gx, Gy, Gz = turned(R, body[1:4])
+    Gx, Gy, Gz = turned((vector(R[0]), vector(R[1]), vector(R[2])), vector(body[1:4]))
     wrench[:] = 0.0
     wrench[0], wrench[1], wrench[5] = -Gy * weight, Gx * weight, -weight
     stiffness[:] = 0.0
-    _add_moment((float(Gx), float(Gy), float(Gz)), (0.0, 0.0, -weight), stiffness)
-    x, y, z = float(p[0]), float(p[1]), float(p[2])
+    _add_moment((Gx, Gy, Gz), (0.0, 0.0, -weight), stiffness)
+    x, y, z = vector(p)
     for i in range(k):
-        arm = (float(p_WB[i, 0]) - x, float(p_WB[i, 1]) - y, float(p_WB[i, 2]) - z)
-        force = (float(out[i, 0]), float(out[i, 1]), float(out[i, 2]))
+        bx, by, bz = vector(p_WB[i])
+        arm, force = (bx - x, by - y, bz - z), vector(out[i])
+        change = (vector(jacobian[i, 0]), vector(jacobian[i, 1]), vector(jacobian[i, 2]))
         _add(arm, force, wrench)
         _add_moment(arm, force, stiffness)
         for b in range(3):
             unit = (1.0 if b == 0 else 0.0, 1.0 if b == 1 else 0.0, 1.0 if b == 2 else 0.0)
-            _add(arm, turned(jacobian[i], cross(unit, arm)), stiffness[:, b])
-            _add(arm, turned(jacobian[i], unit), stiffness[:, 3 + b])
+            _add(arm, turned(change, cross(unit, arm)), stiffness[:, b])
+            _add(arm, turned(change, unit), stiffness[:, 3 + b])
     return 0
 
 

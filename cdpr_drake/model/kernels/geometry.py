@@ -21,12 +21,23 @@ def cross(a, b):
 
 @jit
 def turned(R, b):
-    """Return R b, a point or vector of the platform in W."""
+    """Return R b, for R an array or its rows: a vector of the platform in W."""
+    x, y, z = b[0], b[1], b[2]
+    r, s, t = R[0], R[1], R[2]
     return (
-        R[0, 0] * b[0] + R[0, 1] * b[1] + R[0, 2] * b[2],
-        R[1, 0] * b[0] + R[1, 1] * b[1] + R[1, 2] * b[2],
-        R[2, 0] * b[0] + R[2, 1] * b[1] + R[2, 2] * b[2],
+        r[0] * x + r[1] * y + r[2] * z,
+        s[0] * x + s[1] * y + s[2] * z,
+        t[0] * x + t[1] * y + t[2] * z,
     )
+
+
+@jit
+def vector(a):
+    """Return an array (3,) of floats as a vector.
+
+    Uncompiled, arithmetic on NumPy's scalars takes four times as long as on these.
+    """
+    return float(a[0]), float(a[1]), float(a[2])
 
 
 @jit
@@ -53,13 +64,10 @@ def set_column(i, a, b, D):
 @jit
 def attachment_motion(R, position, omega, velocity, attachment, p_WB, v_WB):
     """Write positions and velocities of the attachment points in W; floats only."""
-    # Plain floats: uncompiled, arithmetic on NumPy's scalars takes four times as long.
-    x, y, z = float(position[0]), float(position[1]), float(position[2])
-    wx, wy, wz = float(omega[0]), float(omega[1]), float(omega[2])
-    vx, vy, vz = float(velocity[0]), float(velocity[1]), float(velocity[2])
+    (x, y, z), (wx, wy, wz), (vx, vy, vz) = vector(position), vector(omega), vector(velocity)
+    rows = (vector(R[0]), vector(R[1]), vector(R[2]))
     for i in range(attachment.shape[0]):
-        e = turned(R, attachment[i])
-        ex, ey, ez = float(e[0]), float(e[1]), float(e[2])
+        ex, ey, ez = turned(rows, vector(attachment[i]))
         p_WB[i, 0], p_WB[i, 1], p_WB[i, 2] = ex + x, ey + y, ez + z
         v_WB[i, 0] = vx + wy * ez - wz * ey
         v_WB[i, 1] = vy + wz * ex - wx * ez

@@ -11,7 +11,7 @@ import numpy as np
 
 from cdpr_drake.model.kernels import jit
 from cdpr_drake.model.kernels.catenary import cable_forces
-from cdpr_drake.model.kernels.geometry import attachment_motion, cross
+from cdpr_drake.model.kernels.geometry import attachment_motion, cross, vector
 from cdpr_drake.model.kernels.servo import rpy_matrix
 
 
@@ -33,12 +33,11 @@ def platform_cable_forces(state, length, rate, points, constants, packed):
         points[0], p_WB, v_WB, length, rate,
         float(constants[0]), constants[1:4], constants[6:], float(constants[4]), out,
     )  # fmt: skip
-    x, y, z = float(state[3]), float(state[4]), float(state[5])
+    x, y, z = vector(state[3:6])
     tx, ty, tz, sx, sy, sz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(k):
-        arm = (float(p_WB[i, 0]) - x, float(p_WB[i, 1]) - y, float(p_WB[i, 2]) - z)
-        force = (float(out[i, 0]), float(out[i, 1]), float(out[i, 2]))
-        torque = cross(arm, force)
+        (bx, by, bz), force = vector(p_WB[i]), vector(out[i])
+        torque = cross((bx - x, by - y, bz - z), force)
         tx, ty, tz = tx + torque[0], ty + torque[1], tz + torque[2]
         sx, sy, sz = sx + force[0], sy + force[1], sz + force[2]
         packed[6 + i], packed[6 + k + i] = out[i, 3], out[i, 4]
