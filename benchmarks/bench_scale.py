@@ -79,7 +79,8 @@ def kernel_calls(robot: CableRobot, calls: int) -> Callable[[], None]:
     generator = np.random.default_rng(0)
     states = state + generator.normal(0.0, 1e-4, (calls, 12))
     lengths = rest.unstrained_length + generator.normal(0.0, 1e-4, (calls, k))
-    points, constants = RobotArrays(robot).cables
+    arrays = RobotArrays(robot)
+    points, constants = arrays.points, arrays.constants
     rate, packed = np.zeros(k), np.zeros(6 + 9 * k)
     return lambda: at_all(states, lengths, rate, points, constants, packed)
 

@@ -37,16 +37,6 @@ class RobotArrays:
         return np.array([self.robot.weight_per_metre, *law, *cable.drum_run], float)
 
     @property
-    def cables(self) -> tuple[Array, Array]:
-        """What the kernels of moving cables take: points and constants."""
-        return self.points, self.constants
-
-    @property
-    def at_rest(self) -> tuple[Array, Array, Array]:
-        """What the kernels of equilibria take: points, constants and body."""
-        return self.points, self.constants, self.body
-
-    @property
     def stiffness(self) -> Array:
         """The law of EA(T), (3,)."""
         return self.constants[1:4]

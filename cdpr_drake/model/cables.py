@@ -50,7 +50,7 @@ class CableSet:
         self.num_cables = robot.num_cables
         self._size = sum(packed_sizes(robot.num_cables).values())
         self.arrays = RobotArrays(robot)
-        self.numbers = self.arrays.cables
+        self.numbers = (self.arrays.points, self.arrays.constants)
 
     def __call__(self, state: Array, length: Array, rate: Array) -> tuple[Array, int]:
         """Return the packed result (6 + 9 k,), its parts as in `packed_sizes`, and a status.
@@ -126,7 +126,7 @@ class CableSet:
         out, jacobian = np.zeros((self.num_cables, WIDTH)), np.zeros((self.num_cables, WIDTH, 8))
         wrench, stiffness = np.zeros(6), np.zeros((6, 6))
         status = balance(
-            *pose_arrays(X_WP), np.array(length, float), *self.arrays.at_rest,
+            *pose_arrays(X_WP), np.array(length, float), *self.numbers, self.arrays.body,
             out, jacobian, wrench, stiffness,
         )  # fmt: skip
         if status:

@@ -115,14 +115,12 @@ def gravity_wrench(robot: CableRobot, X_WP: RigidTransform) -> Array:
 def platform_balance(
     robot: CableRobot, X_WP: RigidTransform, length: Array
 ) -> tuple[Array, Array, Array]:
-    """Return the wrench on the platform at rest, its change with the pose, and the cables' state.
+    """Return the first three of `CableSet.balance`: wrench, stiffness, the cables' outputs.
 
     Args:
         robot: the robot.
         X_WP: the pose.
         length: (k,) [m] total unstrained lengths.
-
-    The first three of `CableSet.balance`.
 
     Raises:
         EquilibriumError: a cable's catenary was not found.
@@ -159,9 +157,11 @@ def forward_kinematics(
         raise ValueError(f"lengths must be {k} positive numbers, got {length}")
     R, p = pose_arrays(as_pose(guess))
     out, jacobian, wrench = np.zeros((k, 14)), np.zeros((k, 14, 8)), np.zeros(6)
+    arrays = RobotArrays(robot)
     status, residual = find_equilibrium(
-        R, p, length, *RobotArrays(robot).at_rest, TOLERANCE, max_iterations, out, jacobian, wrench
-    )
+        R, p, length, arrays.points, arrays.constants, arrays.body,
+        TOLERANCE, max_iterations, out, jacobian, wrench,
+    )  # fmt: skip
     if status:
         raise EquilibriumError(f"cable {status} has no catenary at this pose and length")
     if not residual <= 1e3 * TOLERANCE:

@@ -28,8 +28,7 @@ class WinchModel:
         w = robot.winch
         self._evaluate = kernel.winch_derivatives
         self.num_cables = robot.num_cables
-        self._transmission = w.transmission
-        self._proportional_gain, self._integral_gain = w.proportional_gain, w.integral_gain
+        self._winch = w
         self.parameters = np.array(
             [
                 w.inertia,
@@ -70,11 +69,12 @@ class WinchModel:
             angle: (k,) motor angles [rad].
             T_A: (k,) tensions at the drawing points [N].
         """
-        hold, integral, desired = self._transmission * T_A, np.zeros(angle.size), angle.copy()
-        if self._integral_gain > 0.0:
-            integral = -hold / self._integral_gain
-        elif self._proportional_gain > 0.0:
-            desired = angle - hold / self._proportional_gain
+        w, integral, desired = self._winch, np.zeros(angle.size), angle.copy()
+        hold = w.transmission * T_A
+        if w.integral_gain > 0.0:
+            integral = -hold / w.integral_gain
+        elif w.proportional_gain > 0.0:
+            desired = angle - hold / w.proportional_gain
         return np.concatenate([angle, np.zeros(angle.size), integral]), desired
 
     def derivatives(self, state: Array, desired: Array, T_A: Array) -> tuple[Array, bool]:

@@ -12,7 +12,7 @@ import numpy as np
 from cdpr_drake.model.kernels import jit
 from cdpr_drake.model.kernels.cable_models import length_and_row
 from cdpr_drake.model.kernels.geometry import arm_and_chord, set_column, turned
-from cdpr_drake.model.kernels.servo import STEP, rpy_matrix, solve_symmetric
+from cdpr_drake.model.kernels.servo import STEP, least_norm, rpy_matrix
 
 
 @jit
@@ -41,18 +41,10 @@ def unstrained_lengths(model, order, pose, points, body, stiffness, out, H):
         load[0] -= arm[1] * half
         load[1] += arm[0] * half
         load[5] -= half
-    gram = np.zeros((6, 6), pose.dtype)
-    for a in range(6):
-        for b in range(a + 1):
-            for i in range(k):
-                gram[a, b] += D[a, i] * D[b, i]
-    if not solve_symmetric(gram, load):
+    if not least_norm(D, load, H):
         return -1
     status = 0
     for i in range(k):
-        H[i] = 0.0 * load[0]
-        for a in range(6):
-            H[i] += D[a, i] * load[a]
         if not H[i].real > 0.0:
             status = i + 1
             continue

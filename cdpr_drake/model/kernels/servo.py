@@ -4,11 +4,11 @@ Every function takes real or complex numbers: evaluated at z + i h, the imaginar
 is the exact derivative, so that one source gives the value and the Jacobian.
 
 Arguments in common: model, order: the cable model's index and the order of its series; roll, pitch,
-yaw: extrinsic x-y-z angles [rad]; R (3, 3): rotation matrix; G (6, 6), b (6,): matrix and right-
-hand side; gain [1/s]; limits [m/s, rad/s] of speed; z, s, out, jacobian, rates: inputs and results
-named in each function; points, body, stiffness, run: as in `model.arrays`; X_PM (4, 3) = [R_PM;
-p_PM]; R_M, EM: orientation of the target frame and offset from E to M, in W; twist (6,) = [omega;
-v].
+yaw: extrinsic x-y-z angles [rad]; R (3, 3): rotation matrix; G (6, 6), b (6,): matrix and
+right-hand side; D (6, k), x (k,): of D x = b; gain [1/s]; limits [m/s, rad/s] of speed; z, s, out,
+jacobian, rates: inputs and results named in each function; points, body, stiffness, run: as in
+`model.arrays`; X_PM (4, 3) = [R_PM; p_PM]; R_M, EM: orientation of the target frame and offset from
+E to M, in W; twist (6,) = [omega; v].
 """
 
 from __future__ import annotations
@@ -109,6 +109,23 @@ def solve_symmetric(G, b):
 
 
 @jit
+def least_norm(D, b, x):
+    """Write the x (k,) of least norm with D x = b, for D (6, k); False at a rank below 6."""
+    gram = np.zeros((6, 6), b.dtype)
+    for a in range(6):
+        for c in range(a + 1):
+            for i in range(D.shape[1]):
+                gram[a, c] += D[a, i] * D[c, i]
+    if not solve_symmetric(gram, b):
+        return False
+    for i in range(D.shape[1]):
+        x[i] = 0.0 * b[0]
+        for a in range(6):
+            x[i] += D[a, i] * b[a]
+    return True
+
+
+@jit
 def length_rates(model, order, R, p, twist, T_A, cos_alpha, points, body, stiffness, run, rates):
     """Write the rates of the unstrained lengths (eq. 13) for a twist [omega; v] of E in W.
 
@@ -168,18 +185,11 @@ def length_rates(model, order, R, p, twist, T_A, cos_alpha, points, body, stiffn
     turn = cross(omega, turned(R, body[1:4]))
     change[0] += turn[1] * weight
     change[1] -= turn[0] * weight
-    gram = np.zeros((6, 6), R.dtype)
-    for a in range(6):
-        for b in range(a + 1):
-            for i in range(k):
-                gram[a, b] += D[a, i] * D[b, i]
-    if not solve_symmetric(gram, change):
+    lacking = np.zeros(k, R.dtype)
+    if not least_norm(D, change, lacking):
         return False
     for i in range(k):
-        rate = 0.0 * change[0]
-        for a in range(6):
-            rate -= D[a, i] * change[a]
-        rates[i] += dH[i] * rate
+        rates[i] -= dH[i] * lacking[i]
     return True
 
 
