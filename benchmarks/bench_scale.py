@@ -24,6 +24,7 @@ from benchmarks.harness import Contestant, Report, Spread, interleave, positive,
 from cdpr_drake.diagrams import make_cable_robot, rest_context
 from cdpr_drake.experiments.runs import run as run_setup
 from cdpr_drake.experiments.runs import setup_of_test
+from cdpr_drake.model.arrays import RobotArrays
 from cdpr_drake.model.equilibrium import rest_state
 from cdpr_drake.model.kernels import jit
 from cdpr_drake.model.kernels.platform import platform_cable_forces
@@ -73,14 +74,13 @@ def at_all(states, lengths, rate, points, constants, packed):
 
 def kernel_calls(robot: CableRobot, calls: int) -> Callable[[], None]:
     """Return what calls the cables' kernel so many times at places a little apart."""
-    rest, k, cable = rest_state(robot, POSE), robot.num_cables, robot.cable
+    rest, k = rest_state(robot, POSE), robot.num_cables
     state = np.concatenate([pose_to_vector(rest.X_WP), np.zeros(6)])
     generator = np.random.default_rng(0)
     states = state + generator.normal(0.0, 1e-4, (calls, 12))
     lengths = rest.unstrained_length + generator.normal(0.0, 1e-4, (calls, k))
-    points = np.array([robot.drawing_points, robot.attachment_points])
-    scalars = [robot.weight_per_metre, *cable.stiffness.as_array(), cable.damping_time]
-    constants = np.array([*scalars, cable.breaking_load, *cable.drum_run])
+    arrays = RobotArrays(robot)
+    points, constants = arrays.points, arrays.constants
     rate, packed = np.zeros(k), np.zeros(6 + 9 * k)
     return lambda: at_all(states, lengths, rate, points, constants, packed)
 

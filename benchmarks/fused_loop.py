@@ -16,15 +16,14 @@ from typing import Any
 import numpy as np
 
 from benchmarks.solve_ivp_loop import Loop, Noise, Start
+from cdpr_drake.model.arrays import RobotArrays
 from cdpr_drake.model.cable_models import cable_model_index
-from cdpr_drake.model.cables import CableSet
 from cdpr_drake.model.kernels import jit
 from cdpr_drake.model.kernels.camera import measured_pose
 from cdpr_drake.model.kernels.plant import plant_derivatives
 from cdpr_drake.model.kernels.platform import platform_cable_forces
 from cdpr_drake.model.kernels.servo import motor_rates
 from cdpr_drake.model.rotations import pose_to_vector
-from cdpr_drake.model.servo import law_body
 from cdpr_drake.systems import FusedPlant
 
 
@@ -58,9 +57,9 @@ def fused_run(y, frames, times, steps, gain, goal, sigmas, noises, numbers, law,
     period, latency, ramp = times
     before, after = steps
     pose_noise, tangent_noise, tension_noise = noises
-    model, order, limits, drawing, attachment, body, stiffness, run, target, least, straight = law
+    model, order, limits, points, body, stiffness, run, target, least, straight = law
     left, mount, right = transforms
-    k = drawing.shape[0]
+    k = run.shape[0]
     packed = np.zeros(6 + 9 * k)
     wrench = np.zeros(6)
     slopes = np.zeros((3, y.shape[0]))
@@ -101,9 +100,7 @@ def fused_run(y, frames, times, steps, gain, goal, sigmas, noises, numbers, law,
         if ramp > 0.0:
             now *= min((frame * period + latency) / ramp, 1.0)
         out[:] = 0.0
-        motor_rates(
-            model, order, now, limits, z, drawing, attachment, body, stiffness, run, target, out
-        )
+        motor_rates(model, order, now, limits, z, points, body, stiffness, run, target, out)
         rates[:] = out[:k] / transmission
         advance(
             y,
@@ -127,19 +124,17 @@ class FusedLoop:
             raise ValueError("one filter, no vibration")
         self.robot, self.loop = robot, loop
         k = robot.num_cables
-        law = cable.stiffness.as_array()
-        points = CableSet(robot).numbers[0]
+        arrays = RobotArrays(robot)
         # What the package's own plant takes: platform, winches, load cells without error.
         self.numbers = FusedPlant(robot, robot).numbers
-        mount = _stacked(cameras.X_PM)
         self.transforms = (
             np.vstack([np.eye(3), np.zeros(3)]),
-            mount,
+            arrays.target,
             _stacked(cameras.X_PM.inverse()),
         )
         self.law = (
-            cable_model_index("SCMWE"), 4, np.array([np.inf, np.inf]), points[0].copy(),
-            points[1].copy(), law_body(robot), law, np.zeros(k), mount,
+            cable_model_index("SCMWE"), 4, np.array([np.inf, np.inf]), arrays.points, arrays.body,
+            arrays.stiffness, np.zeros(k), arrays.target,
             0.5 * cable.min_tension, cable.max_tension,
         )  # fmt: skip
         self.sigmas = np.array(

@@ -143,6 +143,77 @@ def test_no_star_import_and_no_pydrake_all(name: str) -> None:
     assert not [t for t in targets if t.endswith(".*") or f"{t}.".startswith("pydrake.all.")]
 
 
+# --- each piece of mathematics once
+
+DRAWING_POINTS = {"p_WA", "drawing", "drawing_points", "_A"}
+KERNELS = "cdpr_drake.model.kernels."
+BATCHED = "cdpr_drake.experiments.reproduction.sag_search"
+"""Robots and poses by the thousand in one array; its tests hold it to the package's functions."""
+
+ONCE = {
+    "attachment points turned into W": (
+        r"attachment_points @|@ [\w.]*attachment_points",
+        ["cdpr_drake.model.kinematics"],
+    ),
+    "a robot's arrays": (
+        r"array\(\[[\w.]*drawing_points, [\w.]*attachment_points\]",
+        ["cdpr_drake.model.arrays"],
+    ),
+    "the wrench column of a cable": (r"cross\([\w.]*(EB|EG|arm)\b", ["cdpr_drake.model.statics"]),
+    "what holds a winch at rest": (r"hold / ", ["cdpr_drake.model.winch"] * 2),
+}
+
+
+def code(path: Path) -> ast.Module:
+    """Return a source file parsed, without its docstrings."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        is_scope = isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
+        if is_scope and ast.get_docstring(node, clean=False) is not None:
+            node.body[0] = ast.Pass()
+    return tree
+
+
+def less_drawing_points(tree: ast.AST) -> list[str]:
+    """Return the differences of anything else and a drawing point."""
+    points = rf"(float\()?([\w.]*\.)?({'|'.join(DRAWING_POINTS)})\b"
+    operations = [node for node in ast.walk(tree) if isinstance(node, ast.BinOp)]
+    less = [(ast.unparse(n), n) for n in operations if isinstance(n.op, ast.Sub)]
+    return [
+        text
+        for text, node in less
+        if re.match(points, ast.unparse(node.right)) and not re.match(points, text)
+    ]
+
+
+def test_a_cable_s_chord_is_spelled_once_for_python_and_once_for_the_kernels() -> None:
+    found = {n: less_drawing_points(code(p)) for n, p in SOURCES.items() if n != BATCHED}
+    assert {name: places for name, places in found.items() if places} == {
+        "cdpr_drake.model.kinematics": ["self.p_WB - self.p_WA"],
+        f"{KERNELS}geometry": [f"b[{i}] - float(drawing[i, {i}])" for i in range(3)],
+    }
+
+
+@pytest.mark.parametrize("what", ONCE)
+def test_each_piece_of_mathematics_is_written_once(what: str) -> None:
+    pattern, where = ONCE[what]
+    sources = {n: p for n, p in SOURCES.items() if not n.startswith(KERNELS) and n != BATCHED}
+    found = [n for n, p in sources.items() for _ in re.findall(pattern, ast.unparse(code(p)))]
+    assert found == where
+
+
+def test_no_kernel_spells_the_arms_and_moments_of_the_cables_out() -> None:
+    pattern = r"R\[0, 0\] \* \w+ \+|\be[xyz] \* \w+ - e[xyz] \*"
+    sources = {n: p for n, p in SOURCES.items() if n.startswith(KERNELS)}
+    assert not [n for n, p in sources.items() if re.search(pattern, ast.unparse(code(p)))]
+
+
+def test_another_spelling_of_a_chord_is_found() -> None:
+    for text in ("x = EB + p - robot.drawing_points", "x = p_WB[i, 0] - float(p_WA[i, 0])"):
+        assert less_drawing_points(ast.parse(text))
+    assert not less_drawing_points(ast.parse("x = drawing_points[1] - drawing_points[0]"))
+
+
 # --- documentation
 
 

@@ -6,7 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from oracle import ORACLE
+from pydrake.autodiffutils import ExtractGradient, ExtractValue, InitializeAutoDiff
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from samples import (
     derivative,
@@ -19,8 +22,9 @@ from samples import (
 )
 
 from cdpr_drake.errors import GeometryError, TensionError
-from cdpr_drake.model import kinematics, statics
-from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model import equilibrium, kinematics, statics
+from cdpr_drake.model.cables import CableSet
+from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.rotations import (
     as_pose,
     exp_rotation,
@@ -404,3 +408,76 @@ def test_pose_vectors_and_poses_are_inverse(seed: int) -> None:
 def test_what_is_no_pose_is_refused(bad: object) -> None:
     with pytest.raises(ValueError, match="six finite numbers"):
         as_pose(bad)
+
+
+# --- AutoDiffXd
+
+
+def small_robot() -> CableRobot:
+    """Return CoGiRo at a tenth of its size."""
+    robot = load_robot("cogiro")
+    return robot.replace(
+        drawing_points=0.1 * robot.drawing_points, attachment_points=0.1 * robot.attachment_points
+    )
+
+
+ROBOTS = {
+    "cogiro": load_robot("cogiro"),
+    "cogiro-98m": load_robot("cogiro-98m"),
+    "small": small_robot(),
+}
+
+
+def geometric(robot: CableRobot, pose: object) -> np.ndarray:
+    """Return what laws are built from at a pose, one after another; lengths over their size."""
+    g = kinematics.cable_geometry(robot, pose)
+    H = np.full(robot.num_cables, 300.0)
+    size = np.linalg.norm(robot.drawing_points[0])
+    parts = [g.EB / size, g.AB / size, g.L / size, g.u, g.Bx / size, g.Bz / size, g.gamma, g.x_A]
+    parts += [g.y_A, g.R_FP, kinematics.D_Bf(g) / size, kinematics.D_u(g), kinematics.D_gamma(g)]
+    parts += [kinematics.D_B(g) / size, statics.wrench_matrix(g) / size, statics.D_theta(g) / size]
+    parts += [statics.weight_wrench(robot, g) / 1e4, statics.attachment_forces(robot, g, H) / 1e3]
+    parts += [statics.D_tau(robot, g, H) / 1e4, statics.D_ext(robot, g) / 1e4]
+    return np.concatenate([part.ravel() for part in parts])
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@settings(max_examples=15, deadline=None)
+@given(
+    turn=st.tuples(*[st.floats(-0.3, 0.3)] * 3),
+    place=st.tuples(*[st.floats(-0.25, 0.25)] * 2, st.floats(0.2, 0.6)),
+)
+def test_autodiff_through_the_geometry_is_its_derivative(
+    name: str, turn: tuple[float, ...], place: tuple[float, ...]
+) -> None:
+    robot = ROBOTS[name]
+    extent = np.ptp(robot.drawing_points, axis=0)
+    extent[2] = robot.drawing_points[:, 2].max()
+    pose = np.concatenate([turn, place * extent])
+    y = geometric(robot, InitializeAutoDiff(pose).ravel())
+    np.testing.assert_allclose(ExtractValue(y).ravel(), geometric(robot, pose), atol=1e-13)
+    steps = np.concatenate([np.full(3, 1e-5), np.full(3, 1e-5 * extent.min())])
+    by_differences = [
+        (geometric(robot, pose + h) - geometric(robot, pose - h)) / (2.0 * step)
+        for h, step in zip(np.diag(steps), steps, strict=True)
+    ]
+    np.testing.assert_allclose(ExtractGradient(y), np.transpose(by_differences), atol=1e-6)
+
+
+def test_the_geometry_takes_a_pose_of_autodiff(cogiro: CableRobot) -> None:
+    vector = InitializeAutoDiff(pose_to_vector(X_WP)).ravel()
+    u = kinematics.cable_geometry(cogiro, vector_to_pose(vector)).u
+    expected = kinematics.cable_geometry(cogiro, vector).u
+    np.testing.assert_array_equal(ExtractGradient(u.ravel()), ExtractGradient(expected.ravel()))
+
+
+def test_a_cable_pulls_the_platform_and_the_wrench_matrix_is_of_the_cables(
+    cogiro: CableRobot,
+) -> None:
+    rest = equilibrium.rest_state(cogiro, X_WP)
+    k = cogiro.num_cables
+    state = np.concatenate([pose_to_vector(rest.X_WP), np.zeros(6)])
+    packed, _ = CableSet(cogiro)(state, rest.unstrained_length, np.zeros(k))
+    assert packed[5] == pytest.approx(cogiro.mass * cogiro.gravity)  # up: they carry the weight
+    W = statics.wrench_matrix(kinematics.cable_geometry(cogiro, X_WP))
+    assert (W @ rest.chord_tension)[5] < 0.0

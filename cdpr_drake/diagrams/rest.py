@@ -14,7 +14,8 @@ from pydrake.systems.primitives import DiscreteTimeDelay, ZeroOrderHold
 from cdpr_drake.model.equilibrium import RestState, forward_kinematics, rest_state
 from cdpr_drake.model.inverse_kinematics import InverseKinematics, motor_angles
 from cdpr_drake.model.robot import CableRobot
-from cdpr_drake.model.rotations import as_pose, pose_to_vector
+from cdpr_drake.model.rotations import Array, as_pose, pose_to_vector
+from cdpr_drake.model.winch import WinchModel
 from cdpr_drake.systems.fused_plant import FusedPlant
 from cdpr_drake.systems.held_pose import HeldPose
 from cdpr_drake.systems.plausible_tension import PlausibleTension
@@ -70,41 +71,35 @@ def set_at_rest(diagram: Diagram, context: Context, rest: RestState) -> None:
     """
     systems = dict(leaf_systems(diagram))
     robot = robot_of(diagram)
-    winch = robot.winch
     tension = rest.tension_at_drawing_point
+    platform = np.concatenate([pose_to_vector(rest.X_WP), np.zeros(6)])
     angles = motor_angles(robot, rest.unstrained_length)
-    hold = winch.transmission * tension  # the motors' torque is -hold
-    integral = np.zeros(robot.num_cables)
-    desired = angles.copy()
-    if winch.integral_gain > 0.0:
-        integral = -hold / winch.integral_gain
-    elif winch.proportional_gain > 0.0:
-        desired = angles - hold / winch.proportional_gain
+    winches, desired = WinchModel(robot).at_rest(angles, tension)
     for path, system in systems.items():
         own = system.GetMyMutableContextFromRoot(context)
         name = path[-1]
         if name == "platform":
-            state = np.concatenate([pose_to_vector(rest.X_WP), np.zeros(6)])
-            system.SetPositionsAndVelocities(own, state)
+            system.SetPositionsAndVelocities(own, platform)
         elif name == "winches":
-            state = np.concatenate([angles, np.zeros(robot.num_cables), integral])
-            own.SetContinuousState(state)
+            own.SetContinuousState(winches)
         elif name == "load_cells":
-            order = system.robot.load_cells.order
-            own.SetContinuousState(np.tile(system.reading(tension), order))
+            own.SetContinuousState(_filters_at_rest(system, tension))
         elif name == "integrator":
             own.SetContinuousState(desired)
         elif isinstance(system, FusedPlant):
-            filtered = np.tile(system.reading(tension), robot.load_cells.order)
-            platform = [pose_to_vector(rest.X_WP), np.zeros(6)]
-            winches = [angles, np.zeros(robot.num_cables), integral]
-            own.SetContinuousState(np.concatenate([*platform, *winches, filtered, desired]))
+            filters = _filters_at_rest(system, tension)
+            own.SetContinuousState(np.concatenate([platform, winches, filters, desired]))
         elif name == "held_rates":
             own.SetDiscreteState(np.zeros(system.get_output_port().size()))
     port = _input_port(diagram, "desired_motor_angles")
     if port is not None:
         port.FixValue(context, desired)
     _fill_samplers(systems, context)
+
+
+def _filters_at_rest(system: Any, tension: Array) -> Array:
+    """Return the state of a system's load cells under tensions (k,) [N] that do not change."""
+    return np.tile(system.reading(tension), system.robot.load_cells.order)
 
 
 def _fill_samplers(systems: dict[tuple[str, ...], System], context: Context) -> None:

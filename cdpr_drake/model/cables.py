@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
+from pydrake.math import RigidTransform, RollPitchYaw
 
+from cdpr_drake.errors import EquilibriumError
+from cdpr_drake.model.arrays import RobotArrays
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, rpy_rate_matrix, skew
 
@@ -28,9 +32,10 @@ def packed_sizes(num_cables: int) -> dict[str, int]:
 
 
 class CableSet:
-    """All k cables of a robot between their winches and the platform.
+    """All k cables of a robot between their winches and the platform, moving or at rest.
 
     Attributes:
+        arrays: the robot as the kernels take it.
         numbers: points and constants, as kernels/platform.py takes them.
 
     Args:
@@ -38,19 +43,14 @@ class CableSet:
     """
 
     def __init__(self, robot: CableRobot) -> None:
-        from cdpr_drake.model.kernels import catenary, platform
+        from cdpr_drake.model.kernels import catenary, geometry, platform
 
-        self._catenary, self._platform = catenary, platform
+        self._catenary, self._geometry, self._platform = catenary, geometry, platform
         self.robot = robot
         self.num_cables = robot.num_cables
         self._size = sum(packed_sizes(robot.num_cables).values())
-        cable = robot.cable
-        self._points = np.array([robot.drawing_points, robot.attachment_points], float)
-        stiffness = cable.stiffness.as_array()
-        scalars = [robot.weight_per_metre, *stiffness, cable.damping_time, cable.breaking_load]
-        self._constants = np.array([*scalars, *cable.drum_run], float)
-        self.numbers = (self._points, self._constants)
-        self._cable = (scalars[0], stiffness, self._constants[6:], cable.damping_time)
+        self.arrays = RobotArrays(robot)
+        self.numbers = (self.arrays.points, self.arrays.constants)
 
     def __call__(self, state: Array, length: Array, rate: Array) -> tuple[Array, int]:
         """Return the packed result (6 + 9 k,), its parts as in `packed_sizes`, and a status.
@@ -64,9 +64,7 @@ class CableSet:
             rate: (k,) their rates [m/s].
         """
         packed = np.empty(self._size)
-        status = self._platform.platform_cable_forces(
-            state, length, rate, self._points, self._constants, packed
-        )
+        status = self._platform.platform_cable_forces(state, length, rate, *self.numbers, packed)
         return packed, status
 
     def with_jacobian(self, state: Array, length: Array, rate: Array) -> tuple[Array, int, Array]:
@@ -84,13 +82,15 @@ class CableSet:
         packed, status = self(state, length, rate)
         if status:
             return packed, status, np.zeros((packed.size, 12 + 2 * k))
-        drawing, attachment = self._points
+        (drawing, attachment), constants = self.numbers
         p_WB, v_WB = np.empty((k, 3)), np.empty((k, 3))
-        self._platform.attachment_motion(state, attachment, p_WB, v_WB)
+        R = RollPitchYaw(state[:3]).ToRotationMatrix().matrix()
+        self._geometry.attachment_motion(R, *state[3:].reshape(3, 3), attachment, p_WB, v_WB)
         out, local = np.empty((k, WIDTH)), np.zeros((k, WIDTH, 8))
         self._catenary.cable_forces_jacobian(
-            drawing, p_WB, v_WB, length, rate, *self._cable, out, local
-        )
+            drawing, p_WB, v_WB, length, rate, float(constants[0]), self.arrays.stiffness,
+            self.arrays.run, float(constants[4]), out, local,
+        )  # fmt: skip
         EB = p_WB - state[3:6]
         points = _point_jacobian(state, EB)
         jacobian = np.zeros((k, WIDTH, 12 + 2 * k))
@@ -105,6 +105,38 @@ class CableSet:
         parts = [torque, jacobian[:, :3].sum(0), jacobian[:, 3], jacobian[:, 4]]
         parts += [jacobian[:, 5:8].reshape(3 * k, -1), jacobian[:, 8:11].reshape(3 * k, -1)]
         return packed, status, np.vstack([*parts, jacobian[:, 11]])
+
+    def balance(self, X_WP: RigidTransform, length: ArrayLike) -> tuple[Array, Array, Array, Array]:
+        """Return what cables and weight do to the platform at rest.
+
+        Args:
+            X_WP: the pose.
+            length: (k,) [m] total unstrained lengths.
+
+        Returns:
+            wrench [torque; force] (6,) at the platform's origin, in W; its derivative (6, 6) with
+            respect to a small motion [rotation; translation] in W; the cables' outputs (k, 14) and
+            Jacobians (k, 14, 8), as in `kernels.catenary.cable_forces_jacobian`.
+
+        Raises:
+            EquilibriumError: a cable's catenary was not found.
+        """
+        from cdpr_drake.model.kernels.equilibrium import balance
+
+        out, jacobian = np.zeros((self.num_cables, WIDTH)), np.zeros((self.num_cables, WIDTH, 8))
+        wrench, stiffness = np.zeros(6), np.zeros((6, 6))
+        status = balance(
+            *pose_arrays(X_WP), np.array(length, float), *self.numbers, self.arrays.body,
+            out, jacobian, wrench, stiffness,
+        )  # fmt: skip
+        if status:
+            raise EquilibriumError(f"cable {status} has no catenary at this pose and length")
+        return wrench, stiffness, out, jacobian
+
+
+def pose_arrays(X_WP: RigidTransform) -> tuple[Array, Array]:
+    """Return rotation (3, 3) and translation (3,) of the pose `X_WP`, to be written to."""
+    return np.array(X_WP.rotation().matrix(), order="C"), np.array(X_WP.translation())
 
 
 def _point_jacobian(state: Array, EB: Array) -> Array:

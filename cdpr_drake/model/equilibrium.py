@@ -9,10 +9,12 @@ from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.errors import EquilibriumError
+from cdpr_drake.model.arrays import RobotArrays
+from cdpr_drake.model.cables import CableSet, pose_arrays
 from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, as_pose
-from cdpr_drake.model.statics import check_rank, distribute, wrench_matrix
+from cdpr_drake.model.statics import check_rank, distribute, wrench_at, wrench_matrix
 
 TOLERANCE = 1e-11
 """Residual wrench relative to the weight (torques per metre of the platform) at an equilibrium."""
@@ -72,10 +74,10 @@ def rest_state(
     T = np.zeros(k)
     V_B, l0, T_A = np.zeros(k), np.zeros(k), np.zeros(k)
     EA = np.full(k, cable.stiffness(robot.mass * robot.gravity / k))
+    upwards = wrench_at(geometry.EB, geometry.z)
     for _ in range(200):
-        rest = np.concatenate([np.cross(geometry.EB, geometry.z), np.tile(geometry.z, (k, 1))], 1)
         previous = T
-        T = distribute(robot, matrix, weight - rest.T @ sag, rule, X_WP)
+        T = distribute(robot, matrix, weight - upwards.T @ sag, rule, X_WP)
         H = T * geometry.Bx / geometry.L
         for i in range(k):
             V_B[i], l0[i], status = irvine_from_horizontal(
@@ -107,39 +109,23 @@ def gravity_wrench(robot: CableRobot, X_WP: RigidTransform) -> Array:
         X_WP: the pose.
     """
     force = np.array([0.0, 0.0, -robot.mass * robot.gravity])
-    return np.concatenate([np.cross(X_WP.rotation() @ robot.center_of_mass, force), force])
+    return wrench_at(X_WP.rotation() @ robot.center_of_mass, force)
 
 
 def platform_balance(
     robot: CableRobot, X_WP: RigidTransform, length: Array
 ) -> tuple[Array, Array, Array]:
-    """Return the wrench on the platform at rest, its change with the pose, and the cables' state.
+    """Return the first three of `CableSet.balance`: wrench, stiffness, the cables' outputs.
 
     Args:
         robot: the robot.
         X_WP: the pose.
         length: (k,) [m] total unstrained lengths.
 
-    Returns:
-        wrench [torque; force] (6,) of cables and weight at the platform's origin, in W; its
-        derivative (6, 6) with respect to a small motion [rotation; translation] in W; the cables'
-        outputs (k, 14), columns as in `kernels.catenary.cable_forces`.
-
     Raises:
         EquilibriumError: a cable's catenary was not found.
     """
-    from cdpr_drake.model.kernels.equilibrium import balance
-
-    k = robot.num_cables
-    out, jacobian = np.zeros((k, 14)), np.zeros((k, 14, 8))
-    wrench, stiffness = np.zeros(6), np.zeros((6, 6))
-    status = balance(
-        *_pose_arrays(X_WP), np.array(length, float), *_arrays(robot), out, jacobian, wrench,
-        stiffness,
-    )  # fmt: skip
-    if status:
-        raise EquilibriumError(f"cable {status} has no catenary at this pose and length")
-    return wrench, stiffness, out
+    return CableSet(robot).balance(X_WP, length)[:3]
 
 
 def forward_kinematics(
@@ -169,11 +155,13 @@ def forward_kinematics(
     length = np.array(length, float)
     if length.shape != (k,) or not np.all(length > 0.0):
         raise ValueError(f"lengths must be {k} positive numbers, got {length}")
-    R, p = _pose_arrays(as_pose(guess))
+    R, p = pose_arrays(as_pose(guess))
     out, jacobian, wrench = np.zeros((k, 14)), np.zeros((k, 14, 8)), np.zeros(6)
+    arrays = RobotArrays(robot)
     status, residual = find_equilibrium(
-        R, p, length, *_arrays(robot), TOLERANCE, max_iterations, out, jacobian, wrench
-    )
+        R, p, length, arrays.points, arrays.constants, arrays.body,
+        TOLERANCE, max_iterations, out, jacobian, wrench,
+    )  # fmt: skip
     if status:
         raise EquilibriumError(f"cable {status} has no catenary at this pose and length")
     if not residual <= 1e3 * TOLERANCE:
@@ -183,21 +171,6 @@ def forward_kinematics(
             f"cable {slackest + 1} ({out[slackest, 3]:.2f} N at the drawing point)"
         )
     return _state(robot, RigidTransform(RotationMatrix(R), p), length, out, residual)
-
-
-def _pose_arrays(X_WP: RigidTransform) -> tuple[Array, Array]:
-    """Return rotation (3, 3) and translation (3,) of a pose, to be written to."""
-    return np.array(X_WP.rotation().matrix(), order="C"), np.array(X_WP.translation())
-
-
-def _arrays(robot: CableRobot) -> tuple[Array, Array, Array]:
-    """Return points, constants and body as the kernels of equilibria take them."""
-    cable = robot.cable
-    points = np.array([robot.drawing_points, robot.attachment_points], float)
-    scalars = [cable.damping_time, cable.breaking_load]
-    law = cable.stiffness.as_array()
-    constants = np.array([robot.weight_per_metre, *law, *scalars, *cable.drum_run], float)
-    return points, constants, np.array([robot.mass * robot.gravity, *robot.center_of_mass], float)
 
 
 def _state(

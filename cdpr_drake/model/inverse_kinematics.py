@@ -7,10 +7,10 @@ from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import GeometryError, TensionError
+from cdpr_drake.model.arrays import RobotArrays
 from cdpr_drake.model.cable_models import cable_model_index
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, as_pose, pose_to_vector
-from cdpr_drake.model.servo import law_body
 
 
 class InverseKinematics:
@@ -33,15 +33,8 @@ class InverseKinematics:
 
         self.robot, self._kernel = robot, kernel
         self._head = (cable_model_index(cable_model), order)
-        self._robot_arrays = tuple(
-            np.ascontiguousarray(a, float)
-            for a in (
-                robot.drawing_points,
-                robot.attachment_points,
-                law_body(robot),
-                robot.cable.stiffness.as_array(),
-            )
-        )
+        arrays = RobotArrays(robot)
+        self._robot_arrays = (arrays.points, arrays.body, arrays.stiffness)
 
     def lengths(self, pose: RigidTransform | ArrayLike) -> Array:
         """Return the total unstrained lengths (k,) [m] at a `pose`, X_WP or [rpy, xyz].

@@ -2,21 +2,58 @@
 
 Twists are [omega; v] (Drake's order; the paper's is the reverse): the angular velocity of the
 platform and the velocity of its origin, the paper's E, expressed in the frame of the geometry.
+
+All functions of this module take AutoDiffXd as well: a pose vector of them, a pose in them, a
+geometry at such a pose.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 
 from cdpr_drake.model.robot import CableRobot
-from cdpr_drake.model.rotations import Array, as_pose, skew
+from cdpr_drake.model.rotations import Array, as_pose, numbers, skew
 
 MIN_HORIZONTAL_SPAN = 1e-6
 """Smallest Bx / L: below it a cable hangs vertically and its plane is undefined."""
+
+
+class CableEnds(NamedTuple):
+    """Where all k cables leave the frame and reach the platform, in W.
+
+    Attributes:
+        p_WA: (k, 3) [m] where they leave.
+        p_WB: (k, 3) [m] where they attach.
+        EB: (k, 3) [m] from the platform's origin to the attachment points.
+    """
+
+    p_WA: Array
+    p_WB: Array
+    EB: Array
+
+    @property
+    def chord(self) -> Array:
+        """From where the cables leave to where they attach (k, 3) [m]."""
+        return self.p_WB - self.p_WA
+
+
+def cable_ends(robot: CableRobot, pose: RigidTransform | ArrayLike) -> CableEnds:
+    """Return the ends of all cables at a pose: today's cables leave from fixed points.
+
+    The one place that knows; `kernels/geometry.py` is the same for the kernels.
+
+    Args:
+        robot: the robot.
+        pose: X_WP, or [roll, pitch, yaw, x, y, z] (rad, m).
+    """
+    X_WP = as_pose(pose)
+    EB = robot.attachment_points @ X_WP.rotation().matrix().T
+    return CableEnds(robot.drawing_points, EB + X_WP.translation(), EB)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,18 +99,17 @@ def cable_geometry(
             F_f; W itself if None.
     """
     X_WP = as_pose(pose)
-    R_WP = X_WP.rotation().matrix()
-    EB = robot.attachment_points @ R_WP.T
-    AB = EB + X_WP.translation() - robot.drawing_points
-    L = np.linalg.norm(AB, axis=1)
-    Bx = np.maximum(np.hypot(AB[:, 0], AB[:, 1]), MIN_HORIZONTAL_SPAN * L)
+    ends = cable_ends(robot, X_WP)
+    AB = ends.chord
+    L = np.sqrt((AB * AB).sum(axis=1))
+    Bx = np.maximum(_hypot(AB[:, 0], AB[:, 1]), MIN_HORIZONTAL_SPAN * L)
     gamma = np.arctan2(AB[:, 1], AB[:, 0])
-    zero = np.zeros_like(gamma)
+    zero = 0.0 * gamma
     x_A = np.column_stack([np.cos(gamma), np.sin(gamma), zero])
     y_A = np.column_stack([-np.sin(gamma), np.cos(gamma), zero])
     R = np.eye(3) if R_FW is None else np.asarray(R_FW, float)
     return CableGeometry(
-        EB=EB @ R.T,
+        EB=ends.EB @ R.T,
         AB=AB @ R.T,
         L=L,
         u=(AB / L[:, None]) @ R.T,
@@ -83,8 +119,13 @@ def cable_geometry(
         x_A=x_A @ R.T,
         y_A=y_A @ R.T,
         z=R[:, 2],
-        R_FP=R @ R_WP,
+        R_FP=R @ X_WP.rotation().matrix(),
     )
+
+
+def _hypot(x: Array, y: Array) -> Array:
+    """Return the length of (x, y): np.hypot, which does not know AutoDiffXd."""
+    return np.sqrt(x * x + y * y) if x.dtype == object else np.hypot(x, y)
 
 
 def D_Bf(geometry: CableGeometry) -> Array:
@@ -134,8 +175,8 @@ def D_B(geometry: CableGeometry) -> Array:
     Args:
         geometry: the chords at a pose.
     """
-    D = np.zeros((len(geometry.L), 3, 6))
     velocity = D_Bf(geometry)
+    D = 0.0 * velocity
     D[:, 0] = np.einsum("ki,kij->kj", geometry.x_A, velocity)
     D[:, 2] = np.einsum("i,kij->kj", geometry.z, velocity)
     return D
@@ -148,8 +189,8 @@ def D_t(R_FM: ArrayLike, p_EM: ArrayLike) -> Array:
         R_FM: (3, 3) orientation of the target frame in F.
         p_EM: (3,) [m] from E to M, expressed in M.
     """
-    R = np.asarray(R_FM, float)
-    D = np.zeros((6, 6))
+    R = numbers(R_FM)
+    D = np.zeros((6, 6)) + 0.0 * R[0, 0]
     D[:3, :3] = R
     D[3:, :3] = R @ skew(p_EM)
     D[3:, 3:] = R

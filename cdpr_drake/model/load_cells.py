@@ -42,9 +42,9 @@ import math
 
 import numpy as np
 
+from cdpr_drake.model.arrays import RobotArrays
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array
-from cdpr_drake.model.servo import law_body
 
 LIVE, DEAD, STUCK = 0.0, 1.0, 2.0
 """What a cell is judged to be."""
@@ -119,12 +119,8 @@ class CellJudge:
         rules = [LOW * least, HIGH * least, robot.cable.max_tension]
         rules += [DEVIATIONS * reading_deviation(robot), LOAD, TRUST, FLOOR, radius or 1.0, RISE]
         rules += [STILL * least, 1.0 / math.ceil(HANDOVER / sample_time)]
-        self._arrays = (
-            np.ascontiguousarray(robot.drawing_points, float),
-            np.ascontiguousarray(robot.attachment_points, float),
-            law_body(robot),
-            np.array(rules),
-        )
+        arrays = RobotArrays(robot)
+        self._arrays = (arrays.points, arrays.body, np.array(rules))
         self.healthy = np.zeros(3 * self._k)
 
     def __call__(self, z: Array) -> Array:

@@ -10,25 +10,34 @@ import math
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydrake.autodiffutils import AutoDiffXd
 from pydrake.common.eigen_geometry import Quaternion
-from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+from pydrake.math import (
+    RigidTransform,
+    RigidTransform_,
+    RollPitchYaw,
+    RollPitchYaw_,
+    RotationMatrix,
+)
 
 Array = NDArray[np.float64]
+
+_POSES = (RigidTransform, RigidTransform_[AutoDiffXd])
+
+
+def numbers(a: ArrayLike) -> Array:
+    """Return `a` as an array of float, or of AutoDiffXd if these are in it."""
+    array = np.asarray(a)
+    return array if array.dtype == object else np.asarray(array, float)
 
 
 def skew(a: ArrayLike) -> Array:
     """Return the cross-product matrix [a]x of a 3-vector `a`, or of each row of an (n, 3) array."""
-    a = np.asarray(a, float)
-    zero = np.zeros(a.shape[:-1])
-    x, y, z = a[..., 0], a[..., 1], a[..., 2]
-    return np.stack(
-        [
-            np.stack([zero, -z, y], -1),
-            np.stack([z, zero, -x], -1),
-            np.stack([-y, x, zero], -1),
-        ],
-        -2,
-    )
+    a = numbers(a)
+    S = np.full((*a.shape, 3), 0.0, a.dtype)
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        S[..., j, i], S[..., i, j] = a[..., k], -a[..., k]
+    return S
 
 
 def exp_rotation(rotation_vector: ArrayLike) -> Array:
@@ -83,7 +92,9 @@ def pose_to_vector(X_WP: RigidTransform) -> Array:
 
 def vector_to_pose(pose: ArrayLike) -> RigidTransform:
     """Return the RigidTransform X_WP of a `pose` vector [roll, pitch, yaw, x, y, z] (rad, m)."""
-    pose = np.asarray(pose, float)
+    pose = numbers(pose)
+    if pose.dtype == object:
+        return RigidTransform_[AutoDiffXd](RollPitchYaw_[AutoDiffXd](pose[:3]), pose[3:])
     if pose.shape != (6,) or not np.all(np.isfinite(pose)):
         raise ValueError(f"a pose is six finite numbers [roll, pitch, yaw, x, y, z], got {pose}")
     return RigidTransform(RollPitchYaw(pose[:3]), pose[3:])
@@ -91,7 +102,7 @@ def vector_to_pose(pose: ArrayLike) -> RigidTransform:
 
 def as_pose(pose: RigidTransform | ArrayLike) -> RigidTransform:
     """Return X_WP of a `pose` given as RigidTransform or as [roll, pitch, yaw, x, y, z]."""
-    return pose if isinstance(pose, RigidTransform) else vector_to_pose(pose)
+    return pose if isinstance(pose, _POSES) else vector_to_pose(pose)
 
 
 def rpy_rate_matrix(rpy: ArrayLike) -> Array:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import GeometryError
+from cdpr_drake.model.arrays import RobotArrays
 from cdpr_drake.model.cable_models import cable_angles, cable_model_index
 from cdpr_drake.model.kinematics import D_t, cable_geometry
 from cdpr_drake.model.robot import CableRobot
@@ -114,16 +115,6 @@ class ServoSettings:
         return self.gain * max(time, 0.0) / self.ramp_time
 
 
-def law_body(robot: CableRobot) -> Array:
-    """Return [m g, x_G, y_G, z_G, w] (5,), weight [N], p_PG [m] and cable weight [N/m].
-
-    Args:
-        robot: the robot as the controller knows it.
-    """
-    weight = robot.mass * robot.gravity
-    return np.array([weight, *robot.center_of_mass, robot.weight_per_metre])
-
-
 class MotorRateLaw:
     """The law of eq. (19) for one robot: what the controller knows, ready to be evaluated.
 
@@ -146,23 +137,10 @@ class MotorRateLaw:
         self.robot, self.settings = robot, settings
         self._kernel = kernel
         self._transmission = robot.winch.transmission
-        run = robot.cable.drum_run if settings.model_drum_run else np.zeros(robot.num_cables)
-        body = law_body(robot)
-        X_PM = robot.cameras.X_PM
-        target = np.vstack([X_PM.rotation().matrix(), X_PM.translation()])
         self._head = (cable_model_index(settings.cable_model), settings.order)
         self._limits = np.array([settings.max_speed, settings.max_angular_speed])
-        self._robot_arrays = tuple(
-            np.ascontiguousarray(a, float)
-            for a in (
-                robot.drawing_points,
-                robot.attachment_points,
-                body,
-                robot.cable.stiffness.as_array(),
-                run,
-                target,
-            )
-        )
+        known = _known(robot, settings.model_drum_run)
+        self._robot_arrays = (*known, RobotArrays(robot).target)
 
     def __call__(self, z: Array, gain: float) -> Array:
         """Return [motor rates; s] (k + 6,) for the input `z` (18 + 4 k,) and `gain` [1/s]."""
@@ -201,8 +179,7 @@ class PoseErrorMap:
         from cdpr_drake.model.kernels import servo as kernel
 
         self._kernel = kernel
-        X_PM = robot.cameras.X_PM
-        self._target = np.vstack([X_PM.rotation().matrix(), X_PM.translation()])
+        self._target = RobotArrays(robot).target
 
     def __call__(self, z: Array) -> Array:
         """Return s = [s_w; s_t] (6,) for `z` (12,), both poses as [rpy, xyz] (rad, m)."""
@@ -215,6 +192,13 @@ class PoseErrorMap:
         s, jacobian = np.zeros(6), np.zeros((6, 12))
         self._kernel.pose_error_jacobian(z, self._target, s, jacobian)
         return s, jacobian
+
+
+def _known(robot: CableRobot, model_drum_run: bool) -> tuple[Array, Array, Array, Array]:
+    """Return points, body, stiffness and run, as the law's kernels take them."""
+    arrays = RobotArrays(robot)
+    run = arrays.run if model_drum_run else np.zeros(robot.num_cables)
+    return arrays.points, arrays.body, arrays.stiffness, run
 
 
 def check_controllable(robot: CableRobot) -> None:
@@ -268,8 +252,6 @@ def D_a(
     X_WP = as_pose(pose)
     k = robot.num_cables
     R = np.ascontiguousarray(X_WP.rotation().matrix())
-    body = law_body(robot)
-    run = np.asarray(robot.cable.drum_run if model_drum_run else np.zeros(k), float)
     # The kernel takes what the sensors give, tension and elevation at A: find them from H.
     H = np.broadcast_to(np.asarray(H, float), (k,))
     chords = cable_geometry(robot, X_WP)
@@ -279,8 +261,7 @@ def D_a(
         rates = np.zeros(k)
         ok = kernel.length_rates(
             cable_model_index(settings.cable_model), settings.order, R, X_WP.translation(),
-            np.eye(6)[j], T_A, H / T_A, robot.drawing_points,
-            robot.attachment_points, body, robot.cable.stiffness.as_array(), run, rates,
+            np.eye(6)[j], T_A, H / T_A, *_known(robot, model_drum_run), rates,
         )  # fmt: skip
         if not ok:
             raise GeometryError("the wrench matrix has rank below 6 at this pose")

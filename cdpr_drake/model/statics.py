@@ -3,6 +3,12 @@
 The simplified static model of Gouttefarde et al. (ICRA 2012), behind the paper's appendix A.2: the
 force applied to a cable at B is theta_B = H (x_A + tan(beta0) z) + (w L / 2) z: half of its weight
 hangs on the platform. Wrenches are [torque; force] at the platform's origin.
+
+Signs. A cable pulls the platform: everywhere else in the package a cable's force and wrench are
+those on the platform (`CableSet`, `CatenaryCableForce`, `RestModel`). The appendix, and so this
+module and the kernels of the law, balance the cables instead: u and theta_B point from A to B, the
+wrench matrix holds the wrenches that the platform exerts on its cables, and W t = weight_wrench.
+The pull of the cables on the platform is - W t.
 """
 
 from __future__ import annotations
@@ -14,18 +20,31 @@ from pydrake.math import RigidTransform
 from cdpr_drake.errors import GeometryError, TensionError
 from cdpr_drake.model.kinematics import D_B, CableGeometry, D_Bf, D_u, cable_geometry
 from cdpr_drake.model.robot import CableRobot
-from cdpr_drake.model.rotations import Array, as_pose, skew
+from cdpr_drake.model.rotations import Array, as_pose, numbers, skew
 
 RANK_TOLERANCE = 1e-6
+
+
+def wrench_at(arm: Array, force: Array) -> Array:
+    """Return (..., 6): the wrench [arm x force; force] at the platform's origin of a force.
+
+    Args:
+        arm: (..., 3) [m] from the platform's origin to where the force acts.
+        force: (..., 3) [N], or one for all arms.
+    """
+    torque = np.cross(arm, force)
+    return np.concatenate([torque, force if force.ndim == arm.ndim else 0.0 * arm + force], axis=-1)
 
 
 def wrench_matrix(geometry: CableGeometry) -> Array:
     """Return (6, k): wrench [torque; force] on the cables per unit of chord tension, (EB x u; u).
 
+    The platform feels the opposite: - wrench_matrix @ tensions.
+
     Args:
         geometry: the chords at a pose.
     """
-    return np.concatenate([np.cross(geometry.EB, geometry.u), geometry.u], axis=1).T
+    return wrench_at(geometry.EB, geometry.u).T
 
 
 def D_theta(geometry: CableGeometry) -> Array:
@@ -60,8 +79,7 @@ def weight_wrench(robot: CableRobot, geometry: CableGeometry) -> Array:
     weight = -robot.mass * robot.gravity * geometry.z
     EG = geometry.R_FP @ robot.center_of_mass
     half = 0.5 * robot.weight_per_metre * geometry.L[:, None] * geometry.z
-    torque = np.cross(EG, weight) - np.cross(geometry.EB, half).sum(0)
-    return np.concatenate([torque, weight - half.sum(0)])
+    return wrench_at(EG, weight) - wrench_at(geometry.EB, half).sum(0)
 
 
 def attachment_forces(robot: CableRobot, geometry: CableGeometry, H: ArrayLike) -> Array:
@@ -72,7 +90,7 @@ def attachment_forces(robot: CableRobot, geometry: CableGeometry, H: ArrayLike) 
         geometry: the chords at a pose.
         H: (k,) [N] horizontal tensions.
     """
-    chord = np.asarray(H, float) * geometry.L / geometry.Bx
+    chord = numbers(H) * geometry.L / geometry.Bx
     half_weight = 0.5 * robot.weight_per_metre * geometry.L
     return chord[:, None] * geometry.u + half_weight[:, None] * geometry.z
 
@@ -85,9 +103,9 @@ def D_tau(robot: CableRobot, geometry: CableGeometry, H: ArrayLike) -> Array:
         geometry: the chords at a pose.
         H: (k,) [N] horizontal tensions.
     """
-    H = np.asarray(H, float)
+    H = numbers(H)
     Bx, Bz, L = geometry.Bx, geometry.Bz, geometry.L
-    slope = np.stack([-Bz, np.zeros_like(Bx), Bx], -1)
+    slope = np.stack([-Bz, 0.0 * Bx, Bx], -1)
     D_f = (H * Bz / (L * Bx**2))[:, None, None] * geometry.u[:, :, None] * slope[:, None, :]
     velocity = D_Bf(geometry)
     D_u1 = D_f @ D_B(geometry) + (H * L / Bx)[:, None, None] * D_u(geometry)
@@ -110,7 +128,7 @@ def D_ext(robot: CableRobot, geometry: CableGeometry) -> Array:
         geometry: the chords at the pose.
     """
     EG = geometry.R_FP @ robot.center_of_mass
-    D = np.zeros((6, 6))
+    D = np.zeros((6, 6)) + 0.0 * EG[0]
     D[:3, :3] = skew(-robot.mass * robot.gravity * geometry.z) @ skew(EG)
     return D
 

@@ -28,6 +28,7 @@ class WinchModel:
         w = robot.winch
         self._evaluate = kernel.winch_derivatives
         self.num_cables = robot.num_cables
+        self._winch = w
         self.parameters = np.array(
             [
                 w.inertia,
@@ -57,6 +58,24 @@ class WinchModel:
         out = np.empty(5 * k, state.dtype)
         self._evaluate(state, desired, T_A, self.parameters, out)
         return out
+
+    def at_rest(self, angle: Array, T_A: Array) -> tuple[Array, Array]:
+        """Return the state (3 k) and the desired angles (k) [rad] with which the winches rest.
+
+        The motors hold the torque - r T_A: by their integrals, or, if the PID has none, by angles
+        that differ from the desired ones.
+
+        Args:
+            angle: (k,) motor angles [rad].
+            T_A: (k,) tensions at the drawing points [N].
+        """
+        w, integral, desired = self._winch, np.zeros(angle.size), angle.copy()
+        hold = w.transmission * T_A
+        if w.integral_gain > 0.0:
+            integral = -hold / w.integral_gain
+        elif w.proportional_gain > 0.0:
+            desired = angle - hold / w.proportional_gain
+        return np.concatenate([angle, np.zeros(angle.size), integral]), desired
 
     def derivatives(self, state: Array, desired: Array, T_A: Array) -> tuple[Array, bool]:
         """Return the derivative of the state (3 k) alone, and whether it is finite.

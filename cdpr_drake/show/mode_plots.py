@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform, RotationMatrix
 
+from cdpr_drake.model.kinematics import cable_ends
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, pose_to_vector
 from cdpr_drake.show.plots import _figure, _legend_below, spread
@@ -331,9 +332,9 @@ def _draw_motion(
         for i, j in itertools.combinations(range(8), 2):
             if (i ^ j).bit_count() == 1:
                 axes.plot(*box[[i, j]].T, color=colour, linewidth=width)
-    for i, rest in enumerate(_moved(X_WP, ends[0], is_pose, B)):
-        cable = robot.drawing_points[i] - rest
-        stub = np.array([rest, rest + 0.6 * size * cable / np.linalg.norm(cable)])
+    cables = cable_ends(robot, X_WP)
+    for i, (rest, chord) in enumerate(zip(cables.p_WB, cables.chord, strict=True)):
+        stub = np.array([rest, rest - 0.6 * size * chord / np.linalg.norm(chord)])
         axes.plot(*stub.T, color=cable_colour(i), linewidth=0.9)
         axes.plot(*way[:, i].T, color=cable_colour(i), linewidth=1.4)
     middle = (X_WP @ (0.5 * (low + high))).ravel()

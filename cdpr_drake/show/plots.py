@@ -19,8 +19,8 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.diagrams import Record
 from cdpr_drake.model.cable_models import sag
+from cdpr_drake.model.kinematics import cable_ends
 from cdpr_drake.model.robot import CableRobot
-from cdpr_drake.model.rotations import vector_to_pose
 from cdpr_drake.model.servo import pose_error
 from cdpr_drake.show.style import REFERENCE, cable_colour, run_styles
 
@@ -180,12 +180,7 @@ def cable_sag(record: Record, robot: CableRobot) -> np.ndarray:
         robot: the robot.
     """
     k, w = robot.num_cables, robot.weight_per_metre
-    p_AB = np.array(
-        [
-            (vector_to_pose(pose) @ robot.attachment_points.T).T - robot.drawing_points
-            for pose in record["pose"]
-        ]
-    )
+    p_AB = np.array([cable_ends(robot, pose).chord for pose in record["pose"]])
     Bx, Bz = np.hypot(p_AB[..., 0], p_AB[..., 1]), p_AB[..., 2]
     u_A = record["tangents_at_drawing_point"].reshape(-1, k, 3)
     H = record["tension_at_drawing_point"] * np.hypot(u_A[..., 0], u_A[..., 1])

@@ -233,7 +233,7 @@ def _platform_scale(loop: Any, context: Any, plant: MultibodyPlant, own: Any) ->
     geometry = cable_geometry(robot, X_WP)
     weight = gravity_wrench(robot, X_WP)
     pull = np.abs(loop.GetOutputPort("tension_at_attachment_point").Eval(context))
-    arms = np.linalg.norm(np.cross(geometry.EB, geometry.u), axis=1)
+    arms = np.linalg.norm(wrench_matrix(geometry)[:3], axis=0)
     torque = max(np.linalg.norm(weight[:3]), np.max(pull * arms))
     force = max(np.linalg.norm(weight[3:]), np.max(pull))
     mass = np.diag(plant.CalcMassMatrix(own))

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdpr_drake.errors import EquilibriumError
-from cdpr_drake.model.equilibrium import RestState, gravity_wrench
+from cdpr_drake.model.cables import CableSet
+from cdpr_drake.model.equilibrium import RestState
+from cdpr_drake.model.kinematics import D_Bf, cable_geometry
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import skew
 from cdpr_drake.model.winch import WinchModel
@@ -84,17 +85,11 @@ class RestModel:
 
     def _winch_jacobian(self) -> Array:
         """Return (3 k, 5 k): the winches' derivatives with [state; desired angles; tensions]."""
-        k, winch = self.robot.num_cables, self.robot.winch
+        k, winches = self.robot.num_cables, WinchModel(self.robot)
         T_A = self.rest.tension_at_drawing_point
-        hold = winch.transmission * T_A
-        integral, desired = np.zeros(k), np.zeros(k)
-        if winch.integral_gain > 0.0:
-            integral = -hold / winch.integral_gain
-        elif winch.proportional_gain > 0.0:
-            desired = -hold / winch.proportional_gain
         # The angle itself plays no part but in its difference to the desired one.
-        state = np.concatenate([np.zeros(2 * k), integral])
-        return WinchModel(self.robot).with_jacobian(state, desired, T_A)[1][: 3 * k]
+        state, desired = winches.at_rest(np.zeros(k), T_A)
+        return winches.with_jacobian(state, desired, T_A)[1][: 3 * k]
 
 
 def rest_model(robot: CableRobot, rest: RestState) -> RestModel:
@@ -107,26 +102,10 @@ def rest_model(robot: CableRobot, rest: RestState) -> RestModel:
     Raises:
         EquilibriumError: a cable's catenary was not found.
     """
-    from cdpr_drake.model.kernels.catenary import cable_forces_jacobian
-
     k, X_WP = robot.num_cables, rest.X_WP
-    R = X_WP.rotation().matrix()
-    EB = robot.attachment_points @ R.T
-    out, jacobian = np.zeros((k, 14)), np.zeros((k, 14, 8))
-    status = cable_forces_jacobian(
-        robot.drawing_points, EB + X_WP.translation(), np.zeros((k, 3)), rest.unstrained_length,
-        np.zeros(k), robot.weight_per_metre, robot.cable.stiffness.as_array(),
-        robot.cable.drum_run, robot.cable.damping_time, out, jacobian,
-    )  # fmt: skip
-    if status:
-        raise EquilibriumError(f"cable {status} has no catenary at this pose and length")
-    arms = skew(EB)
-    motion = np.concatenate([-arms, np.broadcast_to(np.eye(3), (k, 3, 3))], axis=2)
-    to_wrench = np.concatenate([arms, np.broadcast_to(np.eye(3), (k, 3, 3))], axis=1)
-    stiffness = np.einsum("kij,kjl,klm->im", to_wrench, jacobian[:, :3, :3], motion)
-    stiffness[:3, :3] += (skew(out[:, :3]) @ arms).sum(0)
-    EG = R @ robot.center_of_mass
-    stiffness[:3, :3] += skew(gravity_wrench(robot, X_WP)[3:]) @ skew(EG)
+    _, stiffness, out, jacobian = CableSet(robot).balance(X_WP, rest.unstrained_length)
+    motion = D_Bf(cable_geometry(robot, X_WP))
+    to_wrench = motion.swapaxes(1, 2)
     diagonal = np.arange(k)
     tension = np.zeros((k, 12 + 2 * k))
     tension[:, :6] = np.einsum("kj,kjm->km", jacobian[:, 3, :3], motion)
@@ -143,7 +122,7 @@ def rest_model(robot: CableRobot, rest: RestState) -> RestModel:
         tension=tension,
         tangents=out[:, 5:8],
         dbeta=out[:, 11],
-        mass=mass_matrix(robot, R),
+        mass=mass_matrix(robot, X_WP.rotation().matrix()),
     )
 
 

@@ -76,7 +76,7 @@ class FusedPlant(LeafSystem):
         zero = robot.winch.encoder_zero_length
         self.numbers = (
             *self._cables.numbers,
-            _solid(robot),
+            self._cables.arrays.solid,
             self._winch.parameters,
             np.vstack([self._cells.parameters, zero]),
         )
@@ -166,10 +166,3 @@ class FusedPlant(LeafSystem):
 
     def _calc_tension(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(self._winches(context)[4 * self._k :])
-
-
-def _solid(robot: CableRobot) -> Array:
-    """Return platform and payload (8, 3) as kernels/plant.py takes them."""
-    inertia = np.array(robot.inertia, float)
-    scalars = [robot.mass, robot.gravity, 0.0]
-    return np.vstack([scalars, robot.center_of_mass, inertia, np.linalg.inv(inertia)])

@@ -6,6 +6,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
+from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, vector_to_pose
 from cdpr_drake.model.vision.outages import STEREO_PAIR, Outage, Outages
@@ -116,9 +117,7 @@ class StereoCameras(LeafSystem):
         held, bias = state[: 3 * k].reshape(-1, 3), state[4 * k : 5 * k]
         if not np.all(valid | held.any(axis=1)):
             X_WP = vector_to_pose(self._pose_port.Eval(context))
-            chords = self.calibrated.attachment_points @ X_WP.rotation().matrix().T
-            chords = chords + X_WP.translation() - self.calibrated.drawing_points
-            straight = chords / np.linalg.norm(chords, axis=1, keepdims=True)
+            straight = cable_geometry(self.calibrated, X_WP).u
             held = np.where(held.any(axis=1, keepdims=True), held, straight)
         tangents = np.where(valid[:, None], estimate.tangents, held)
         bias = np.where(valid, estimate.curvature_bias, bias)

@@ -17,6 +17,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.experiments.runs import Setup, setup_of_test
 from cdpr_drake.model.equilibrium import RestState, forward_kinematics
 from cdpr_drake.model.inverse_kinematics import InverseKinematics
+from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.robot import AxialStiffness, CableRobot
 from cdpr_drake.model.rotations import Array
 from cdpr_drake.systems import ExponentialApproach
@@ -94,7 +95,7 @@ def joint_space_rest(
     for _ in range(20):
         deflection = MM_PER_KN * structure.post_compliance * _pull_on_posts(robot, rest)
         points = believed.drawing_points + deflection
-        moved = np.abs(points - robot.drawing_points).max()
+        moved = np.abs(robot.drawing_points - points).max()
         robot = robot.replace(drawing_points=points)
         rest = forward_kinematics(robot, length, rest.X_WP)
         if moved < 3e-6:
@@ -104,9 +105,7 @@ def joint_space_rest(
 
 def _pull_on_posts(robot: CableRobot, rest: RestState) -> Array:
     """Return the horizontal pull (k, 3) [N] on each cable's post; two in succession share one."""
-    p_WB = (rest.X_WP @ robot.attachment_points.T).T
-    chord = p_WB - robot.drawing_points
-    pull = rest.chord_tension[:, None] * chord / np.linalg.norm(chord, axis=1)[:, None]
+    pull = rest.chord_tension[:, None] * cable_geometry(robot, rest.X_WP).u
     pull[:, 2] = 0.0
     return np.repeat(pull.reshape(-1, 2, 3).sum(axis=1), 2, axis=0)
 

@@ -51,6 +51,7 @@ from __future__ import annotations
 import math
 
 from cdpr_drake.model.kernels import jit
+from cdpr_drake.model.kernels.geometry import chord, vector
 
 MAX_ITERATIONS = 40
 # Vertical cables: the plane of the cable is undefined at Bx = 0, so Bx is kept above this times L.
@@ -466,11 +467,9 @@ def solve_catenary(Bx, Bz, l0, w, EA):
 
 
 @jit
-def _chord(i, p_WA, p_WB):
+def _leaning_chord(i, p_WA, p_WB):
     """Return (dx, dy, Bz, Bx, L) of cable i; a vertical cable leans a little towards +x."""
-    dx = float(p_WB[i, 0]) - float(p_WA[i, 0])
-    dy = float(p_WB[i, 1]) - float(p_WA[i, 1])
-    Bz = float(p_WB[i, 2]) - float(p_WA[i, 2])
+    dx, dy, Bz = chord(i, p_WA, vector(p_WB[i]))
     Bx = math.sqrt(dx * dx + dy * dy)
     lean = MIN_LEAN * abs(Bz)
     if Bx < lean:
@@ -533,7 +532,7 @@ def _force(
     """Write row i of `out`. Return (failed, H, V_B, Bx as clamped, linearisation) for
     `_differentiate`; the linearisation is at the solution if the cable is damped or `differs`.
     """
-    dx, dy, Bz, Bx, L = _chord(i, p_WA, p_WB)
+    dx, dy, Bz, Bx, L = _leaning_chord(i, p_WA, p_WB)
     l = float(length[i])
     run = float(drum_run[i])
     rate = float(length_rate[i])
@@ -708,7 +707,7 @@ def _differentiate(
     H, V_B, clamped, linear, out, jacobian,
 ):  # fmt: skip
     """Write jacobian[i] from the solution in out[i]. Return whether a number is not finite."""
-    dx, dy, Bz, Bx, L = _chord(i, p_WA, p_WB)
+    dx, dy, Bz, Bx, L = _leaning_chord(i, p_WA, p_WB)
     l = float(length[i])
     rate = float(length_rate[i])
     vx = float(v_WB[i, 0])

@@ -1,12 +1,11 @@
 """The balance of a platform hanging at rest on elastic catenaries, and the pose where it holds.
 
 Arguments in common: R (3, 3), p (3,) [m]: the pose X_WP; length (k,) [m]: total unstrained lengths;
-points (2, k, 3) [m]: p_WA and p_PB; constants (6 + k,) = [w (N/m); stiffness (3); damping time (s);
-breaking load (N); runs (m)]; body (4,) = [mass g (N), x_G, y_G, z_G (m)]. Written: out (k, 14) and
-jacobian (k, 14, 8) as in `catenary.cable_forces_jacobian`; wrench (6,) [torque; force] on the
-platform at its origin, in W; stiffness (6, 6), its change with a motion [rotation; translation] in
-W; turn (3, 3), scratch. rotation (3,) [rad]: a rotation vector; step (6,): a motion; tolerance: of
-the wrench over the weight [-]; max_iterations: evaluations of the balance at most.
+points, constants, body: as in `model.arrays`. Written: out (k, 14) and jacobian (k, 14, 8) as in
+`catenary.cable_forces_jacobian`; wrench (6,) [torque; force] on the platform at its origin, in W;
+stiffness (6, 6), its change with a motion [rotation; translation] in W; turn (3, 3), scratch.
+rotation (3,) [rad]: a rotation vector; step (6,): a motion; tolerance: of the wrench over the
+weight [-]; max_iterations: evaluations of the balance at most.
 """
 
 from __future__ import annotations
@@ -17,6 +16,7 @@ import numpy as np
 
 from cdpr_drake.model.kernels import jit
 from cdpr_drake.model.kernels.catenary import cable_forces_jacobian
+from cdpr_drake.model.kernels.geometry import attachment_motion, cross, turned, vector
 
 MAX_ROTATION = 0.3  # of one step [rad]
 MAX_TRANSLATION = 1.0  # of one step [m]
@@ -25,11 +25,18 @@ LEAST_STEP = 1e-14  # below it what is left is round-off of stiff cables
 
 
 @jit
-def _add_moment(ex, ey, ez, fx, fy, fz, stiffness):
+def _add(arm, force, wrench):
+    """Add [arm x force; force] to a wrench (6,)."""
+    torque = cross(arm, force)
+    for a in range(3):
+        wrench[a] += torque[a]
+        wrench[3 + a] += force[a]
+
+
+@jit
+def _add_moment(e, f, stiffness):
     """Add [f]x [e]x, the change of e x f as e turns with the platform, to stiffness[:3, :3]."""
-    dot = ex * fx + ey * fy + ez * fz
-    e = (ex, ey, ez)
-    f = (fx, fy, fz)
+    dot = e[0] * f[0] + e[1] * f[1] + e[2] * f[2]
     for a in range(3):
         for b in range(3):
             stiffness[a, b] += e[a] * f[b]
@@ -40,62 +47,32 @@ def _add_moment(ex, ey, ez, fx, fy, fz, stiffness):
 def balance(R, p, length, points, constants, body, out, jacobian, wrench, stiffness):
     """Write the wrench on the platform and its stiffness. Return the status of the cables."""
     k = points.shape[1]
-    p_WB = np.zeros((k, 3))
-    still = np.zeros((k, 3))
-    r00, r01, r02 = float(R[0, 0]), float(R[0, 1]), float(R[0, 2])
-    r10, r11, r12 = float(R[1, 0]), float(R[1, 1]), float(R[1, 2])
-    r20, r21, r22 = float(R[2, 0]), float(R[2, 1]), float(R[2, 2])
-    x, y, z = float(p[0]), float(p[1]), float(p[2])
-    for i in range(k):
-        bx, by, bz = float(points[1, i, 0]), float(points[1, i, 1]), float(points[1, i, 2])
-        p_WB[i, 0] = r00 * bx + r01 * by + r02 * bz + x
-        p_WB[i, 1] = r10 * bx + r11 * by + r12 * bz + y
-        p_WB[i, 2] = r20 * bx + r21 * by + r22 * bz + z
+    p_WB, v_WB = np.zeros((k, 3)), np.zeros((k, 3))
+    still = np.zeros(3)
+    attachment_motion(R, p, still, still, points[1], p_WB, v_WB)
     status = cable_forces_jacobian(
-        points[0], p_WB, still, length, np.zeros(k), float(constants[0]), constants[1:4],
+        points[0], p_WB, v_WB, length, np.zeros(k), float(constants[0]), constants[1:4],
         constants[6:], float(constants[4]), out, jacobian,
     )  # fmt: skip
     if status:
         return status
     weight = float(body[0])
-    gx, gy, gz = float(body[1]), float(body[2]), float(body[3])
-    Gx = r00 * gx + r01 * gy + r02 * gz
-    Gy = r10 * gx + r11 * gy + r12 * gz
-    Gz = r20 * gx + r21 * gy + r22 * gz
+    Gx, Gy, Gz = turned((vector(R[0]), vector(R[1]), vector(R[2])), vector(body[1:4]))
     wrench[:] = 0.0
     wrench[0], wrench[1], wrench[5] = -Gy * weight, Gx * weight, -weight
     stiffness[:] = 0.0
-    _add_moment(Gx, Gy, Gz, 0.0, 0.0, -weight, stiffness)
+    _add_moment((Gx, Gy, Gz), (0.0, 0.0, -weight), stiffness)
+    x, y, z = vector(p)
     for i in range(k):
-        ex, ey, ez = float(p_WB[i, 0]) - x, float(p_WB[i, 1]) - y, float(p_WB[i, 2]) - z
-        fx, fy, fz = float(out[i, 0]), float(out[i, 1]), float(out[i, 2])
-        wrench[0] += ey * fz - ez * fy
-        wrench[1] += ez * fx - ex * fz
-        wrench[2] += ex * fy - ey * fx
-        wrench[3] += fx
-        wrench[4] += fy
-        wrench[5] += fz
-        _add_moment(ex, ey, ez, fx, fy, fz, stiffness)
-        for b in range(6):
-            # The velocity of B under a unit motion b.
-            if b < 3:
-                vx = ez if b == 1 else (-ey if b == 2 else 0.0)
-                vy = ex if b == 2 else (-ez if b == 0 else 0.0)
-                vz = ey if b == 0 else (-ex if b == 1 else 0.0)
-            else:
-                vx = 1.0 if b == 3 else 0.0
-                vy = 1.0 if b == 4 else 0.0
-                vz = 1.0 if b == 5 else 0.0
-            J = jacobian[i]
-            dx = float(J[0, 0]) * vx + float(J[0, 1]) * vy + float(J[0, 2]) * vz
-            dy = float(J[1, 0]) * vx + float(J[1, 1]) * vy + float(J[1, 2]) * vz
-            dz = float(J[2, 0]) * vx + float(J[2, 1]) * vy + float(J[2, 2]) * vz
-            stiffness[0, b] += ey * dz - ez * dy
-            stiffness[1, b] += ez * dx - ex * dz
-            stiffness[2, b] += ex * dy - ey * dx
-            stiffness[3, b] += dx
-            stiffness[4, b] += dy
-            stiffness[5, b] += dz
+        bx, by, bz = vector(p_WB[i])
+        arm, force = (bx - x, by - y, bz - z), vector(out[i])
+        change = (vector(jacobian[i, 0]), vector(jacobian[i, 1]), vector(jacobian[i, 2]))
+        _add(arm, force, wrench)
+        _add_moment(arm, force, stiffness)
+        for b in range(3):
+            unit = (1.0 if b == 0 else 0.0, 1.0 if b == 1 else 0.0, 1.0 if b == 2 else 0.0)
+            _add(arm, turned(change, cross(unit, arm)), stiffness[:, b])
+            _add(arm, turned(change, unit), stiffness[:, 3 + b])
     return 0
 
 

@@ -2,12 +2,11 @@
 
 Arguments in common: z = [pose (6); readings (k) [N]; stuck (k)], float or complex; pose, reading,
 memory (3 k,): the same in parts, memory = [reading when it last changed; what was expected then;
-stuck]; drawing, attachment (k, 3): p_WA and p_PB; body = [mass g, x_G, y_G, z_G, w]; p (11,) =
-[reading below which a cell may be dead, above which it is not, max_tension, noise tolerated [N],
-part of the weight tolerated, least trust, least tension over w Bx, length that torques are divided
-by [m], part of what is tolerated over which a reading goes missing, change of a reading that counts
-as none [N], step of a frame]; M (6, k + 2), G (6, 6): see `weigh`; i, j: columns; x: a number; out,
-jacobian, after: results.
+stuck]; points, body: as in `model.arrays`; p (11,) = [reading below which a cell may be dead, above
+which it is not, max_tension, noise tolerated [N], part of the weight tolerated, least trust, least
+tension over w Bx, length that torques are divided by [m], part of what is tolerated over which a
+reading goes missing, change of a reading that counts as none [N], step of a frame]; M (6, k + 2), G
+(6, 6): see `weigh`; i, j: columns; x: a number; out, jacobian, after: results.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.model.kernels import jit
+from cdpr_drake.model.kernels.geometry import arm_and_chord, set_column
 from cdpr_drake.model.kernels.servo import STEP, rpy_matrix
 
 
@@ -40,7 +40,7 @@ def filter_derivatives(x, tension, noise, p, xdot):
 
 
 @jit
-def weigh(z, drawing, attachment, body, p, M, G, low, floor):
+def weigh(z, points, body, p, M, G, low, floor):
     """Write the balance of the platform on k cables whose cells are trusted more or less.
 
     M (6, k + 2): columns of each cable's wrench [torque / p[7]; force] per unit of tension, of what
@@ -48,6 +48,7 @@ def weigh(z, drawing, attachment, body, p, M, G, low, floor):
     outer products over the trust in their cells; low (k,): 1 for a reading below p[0], 0 above
     p[1]; floor (k,) [N]: least tension of each cable for the law.
     """
+    drawing, attachment = points[0], points[1]
     k = drawing.shape[0]
     R = np.zeros((3, 3), z.dtype)
     rpy_matrix(z[0], z[1], z[2], R)
@@ -60,24 +61,16 @@ def weigh(z, drawing, attachment, body, p, M, G, low, floor):
     for a in range(6):
         M[a, k] = -M[a, k + 1]
     for i in range(k):
-        bx, by, bz = attachment[i, 0], attachment[i, 1], attachment[i, 2]
-        ex = R[0, 0] * bx + R[0, 1] * by + R[0, 2] * bz
-        ey = R[1, 0] * bx + R[1, 1] * by + R[1, 2] * bz
-        ez = R[2, 0] * bx + R[2, 1] * by + R[2, 2] * bz
-        ax = ex + z[3] - drawing[i, 0]
-        ay = ey + z[4] - drawing[i, 1]
-        az = ez + z[5] - drawing[i, 2]
+        arm, (ax, ay, az) = arm_and_chord(i, R, z[3:6], drawing, attachment)
         L = np.sqrt(ax * ax + ay * ay + az * az)
-        ux, uy, uz = ax / L, ay / L, az / L
-        M[0, i] = (ey * uz - ez * uy) / radius
-        M[1, i] = (ez * ux - ex * uz) / radius
-        M[2, i] = (ex * uy - ey * ux) / radius
-        M[3, i], M[4, i], M[5, i] = ux, uy, uz
+        set_column(i, arm, (ax / L, ay / L, az / L), M)
+        for a in range(3):
+            M[a, i] /= radius
         # Tension along the chord: at A it is larger by the weight of half the cable's height.
         chord = z[6 + i] + 0.5 * w * az
         half = 0.5 * w * L
-        M[0, k] += half * ey / radius
-        M[1, k] -= half * ex / radius
+        M[0, k] += half * arm[1] / radius
+        M[1, k] -= half * arm[0] / radius
         M[5, k] += half
         low[i] = within((p[1] - z[6 + i]) / (p[1] - p[0]))
         floor[i] = p[6] * w * np.sqrt(ax * ax + ay * ay)
@@ -136,18 +129,18 @@ def product(M, i, j):
 
 
 @jit
-def judge_readings(z, drawing, attachment, body, p, out):
+def judge_readings(z, points, body, p, out):
     """Write what the balance of the platform says of k readings, as `model.load_cells` explains.
 
     out (4, k): plausible tension [N], expectation [N], how far the cell is dead (0 to 1), noise
     tolerated of reading less expectation [N].
     """
-    k = drawing.shape[0]
+    k = points.shape[1]
     M = np.zeros((6, k + 2), z.dtype)
     G = np.zeros((6, 6), z.dtype)
     low = np.zeros(k, z.dtype)
     floor = np.zeros(k, z.dtype)
-    weigh(z, drawing, attachment, body, p, M, G, low, floor)
+    weigh(z, points, body, p, M, G, low, floor)
     reduce_by(G, M)
     for i in range(k):
         reading, stuck = z[6 + i], z[6 + k + i]
@@ -173,7 +166,7 @@ def judge_readings(z, drawing, attachment, body, p, out):
 
 
 @jit
-def judge_readings_jacobian(z, drawing, attachment, body, p, out, jacobian):
+def judge_readings_jacobian(z, points, body, p, out, jacobian):
     """Write `judge_readings` and its Jacobian (4, k, n) by z (n,), by complex steps."""
     zc = np.zeros(z.shape[0], np.complex128)
     yc = np.zeros(out.shape, np.complex128)
@@ -181,7 +174,7 @@ def judge_readings_jacobian(z, drawing, attachment, body, p, out, jacobian):
         zc[j] = z[j]
     for j in range(z.shape[0]):
         zc[j] = zc[j] + STEP * 1j
-        judge_readings(zc, drawing, attachment, body, p, yc)
+        judge_readings(zc, points, body, p, yc)
         zc[j] = z[j]
         for a in range(out.shape[0]):
             for i in range(out.shape[1]):
@@ -190,33 +183,33 @@ def judge_readings_jacobian(z, drawing, attachment, body, p, out, jacobian):
 
 
 @jit
-def judge_parts(pose, reading, memory, drawing, attachment, body, p, out):
+def judge_parts(pose, reading, memory, points, body, p, out):
     """Write `judge_readings` for an input in parts."""
-    k = drawing.shape[0]
+    k = points.shape[1]
     z = np.empty(6 + 2 * k)
     z[:6] = pose
     for i in range(k):
         z[6 + i] = reading[i]
         z[6 + k + i] = memory[2 * k + i]
-    judge_readings(z, drawing, attachment, body, p, out)
+    judge_readings(z, points, body, p, out)
 
 
 @jit
-def plausible_tension(pose, reading, memory, drawing, attachment, body, p, out):
+def plausible_tension(pose, reading, memory, points, body, p, out):
     """Write the plausible tensions (k,) [N] alone into out."""
-    k = drawing.shape[0]
+    k = points.shape[1]
     judged = np.empty((4, k))
-    judge_parts(pose, reading, memory, drawing, attachment, body, p, judged)
+    judge_parts(pose, reading, memory, points, body, p, judged)
     for i in range(k):
         out[i] = judged[0, i]
 
 
 @jit
-def remember(pose, reading, memory, drawing, attachment, body, p, after):
+def remember(pose, reading, memory, points, body, p, after):
     """Write what is remembered of k cells a frame later (3 k,), as `model.load_cells` explains."""
-    k = drawing.shape[0]
+    k = points.shape[1]
     judged = np.empty((4, k))
-    judge_parts(pose, reading, memory, drawing, attachment, body, p, judged)
+    judge_parts(pose, reading, memory, points, body, p, judged)
     for i in range(k):
         then, expected, stuck = memory[i], memory[k + i], memory[2 * k + i]
         goal = 0.0

@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from cdpr_drake.model.kernels import jit
+from cdpr_drake.model.kernels.geometry import cross, turned
 from cdpr_drake.model.kernels.load_cell import filter_derivatives
 from cdpr_drake.model.kernels.platform import platform_cable_forces
 from cdpr_drake.model.kernels.servo import rpy_matrix
@@ -19,22 +20,6 @@ from cdpr_drake.model.kernels.winch import winch_derivatives
 
 NOT_FINITE = 1_000_000
 """Status of `plant_derivatives` where the cables are well but a derivative is not finite."""
-
-
-@jit
-def _product(M, x, y, z):
-    """Return the product of M (3, 3) and (x, y, z)."""
-    return (
-        float(M[0, 0]) * x + float(M[0, 1]) * y + float(M[0, 2]) * z,
-        float(M[1, 0]) * x + float(M[1, 1]) * y + float(M[1, 2]) * z,
-        float(M[2, 0]) * x + float(M[2, 1]) * y + float(M[2, 2]) * z,
-    )
-
-
-@jit
-def _cross(a, b):
-    """Return a x b."""
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 @jit
@@ -48,19 +33,19 @@ def platform_derivatives(state, wrench, solid, out):
     rpy_matrix(roll, pitch, yaw, R)
     Rt, inertia, inverse = R.T, solid[2:5], solid[5:8]
     mass, gravity = float(solid[0, 0]), float(solid[0, 1])
-    EG = _product(R, float(solid[1, 0]), float(solid[1, 1]), float(solid[1, 2]))
+    EG = turned(R, solid[1])
     omega = (float(state[6]), float(state[7]), float(state[8]))
     fx, fy, fz = float(wrench[3]), float(wrench[4]), float(wrench[5])
     # About G the weight has no moment, and the other forces act at the platform's origin.
-    shift = _cross(EG, (fx, fy, fz))
+    shift = cross(EG, (fx, fy, fz))
     tx, ty, tz = float(wrench[0]) - shift[0], float(wrench[1]) - shift[1], float(wrench[2])
-    torque = _product(Rt, tx, ty, tz - shift[2])
-    w = _product(Rt, omega[0], omega[1], omega[2])
-    gyro = _cross(w, _product(inertia, w[0], w[1], w[2]))
-    a = _product(inverse, torque[0] - gyro[0], torque[1] - gyro[1], torque[2] - gyro[2])
-    alpha = _product(R, a[0], a[1], a[2])
-    tangential = _cross(alpha, EG)
-    centripetal = _cross(omega, _cross(omega, EG))
+    torque = turned(Rt, (tx, ty, tz - shift[2]))
+    w = turned(Rt, omega)
+    gyro = cross(w, turned(inertia, w))
+    a = turned(inverse, (torque[0] - gyro[0], torque[1] - gyro[1], torque[2] - gyro[2]))
+    alpha = turned(R, a)
+    tangential = cross(alpha, EG)
+    centripetal = cross(omega, cross(omega, EG))
     cy, sy = math.cos(yaw), math.sin(yaw)
     along = (cy * omega[0] + sy * omega[1]) / math.cos(pitch)
     out[0] = along

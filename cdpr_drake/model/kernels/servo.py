@@ -3,12 +3,12 @@
 Every function takes real or complex numbers: evaluated at z + i h, the imaginary part divided by h
 is the exact derivative, so that one source gives the value and the Jacobian.
 
-Arguments in common: model, order: the cable model's index and the order of its series; roll,
-pitch, yaw: extrinsic x-y-z angles [rad]; R (3, 3): rotation matrix; G (6, 6), b (6,): matrix and
-right-hand side; gain [1/s]; limits [m/s, rad/s] of speed; z, s, out, jacobian, rates: inputs and
-results named in each function; drawing, attachment (k, 3) [m]: p_WA and p_PB; body = [mass g, x_G,
-y_G, z_G, w]; stiffness (3,); run (k,) [m]; X_PM (4, 3) = [R_PM; p_PM]; R_M, EM: orientation of the
-target frame and offset from E to M, in W; twist (6,) = [omega; v].
+Arguments in common: model, order: the cable model's index and the order of its series; roll, pitch,
+yaw: extrinsic x-y-z angles [rad]; R (3, 3): rotation matrix; G (6, 6), b (6,): matrix and
+right-hand side; D (6, k), x (k,): of D x = b; gain [1/s]; limits [m/s, rad/s] of speed; z, s, out,
+jacobian, rates: inputs and results named in each function; points, body, stiffness, run: as in
+`model.arrays`; X_PM (4, 3) = [R_PM; p_PM]; R_M, EM: orientation of the target frame and offset from
+E to M, in W; twist (6,) = [omega; v].
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 
 from cdpr_drake.model.kernels import jit
 from cdpr_drake.model.kernels.cable_models import length_and_row, run_row
+from cdpr_drake.model.kernels.geometry import arm_and_chord, cross, set_column, turned
 
 SLSM = 3
 RANK_DEFICIENT = -1
@@ -108,36 +109,45 @@ def solve_symmetric(G, b):
 
 
 @jit
-def length_rates(
-    model, order, R, p, twist, T_A, cos_alpha, drawing, attachment, body, stiffness, run, rates
-):
+def least_norm(D, b, x):
+    """Write the x (k,) of least norm with D x = b, for D (6, k); False at a rank below 6."""
+    gram = np.zeros((6, 6), b.dtype)
+    for a in range(6):
+        for c in range(a + 1):
+            for i in range(D.shape[1]):
+                gram[a, c] += D[a, i] * D[c, i]
+    if not solve_symmetric(gram, b):
+        return False
+    for i in range(D.shape[1]):
+        x[i] = 0.0 * b[0]
+        for a in range(6):
+            x[i] += D[a, i] * b[a]
+    return True
+
+
+@jit
+def length_rates(model, order, R, p, twist, T_A, cos_alpha, points, body, stiffness, run, rates):
     """Write the rates of the unstrained lengths (eq. 13) for a twist [omega; v] of E in W.
 
     R, p: the pose; T_A, cos_alpha (k,): tension at the drawing points and cosine of the tangents'
-    elevation there, so that H = T_A cos_alpha (eq. 16); drawing, attachment (k, 3); body =
-    [mass g, x_G, y_G, z_G, w]; stiffness (3,); run (k,): drum-to-eyelet runs that the law models
-    (zero: it does not). Returns False when the wrench matrix has rank below 6.
+    elevation there, so that H = T_A cos_alpha (eq. 16); run (k,): drum-to-eyelet runs that the law
+    models (zero: it does not). Returns False when the wrench matrix has rank below 6.
     """
-    k = drawing.shape[0]
+    k = run.shape[0]
+    drawing, attachment = points[0], points[1]
     weight, w = body[0], body[4]
-    wx, wy, wz = twist[0], twist[1], twist[2]
+    omega = (twist[0], twist[1], twist[2])
     D = np.zeros((6, k), R.dtype)
     change = np.zeros(6, R.dtype)
     dH = np.zeros(k, R.dtype)
     for i in range(k):
-        bx, by, bz = attachment[i, 0], attachment[i, 1], attachment[i, 2]
-        ex = R[0, 0] * bx + R[0, 1] * by + R[0, 2] * bz
-        ey = R[1, 0] * bx + R[1, 1] * by + R[1, 2] * bz
-        ez = R[2, 0] * bx + R[2, 1] * by + R[2, 2] * bz
-        ax = ex + p[0] - drawing[i, 0]
-        ay = ey + p[1] - drawing[i, 1]
-        Bz = ez + p[2] - drawing[i, 2]
+        arm, (ax, ay, Bz) = arm_and_chord(i, R, p, drawing, attachment)
         Bx = np.sqrt(ax * ax + ay * ay)
         L = np.sqrt(Bx * Bx + Bz * Bz)
         cx, cy = ax / Bx, ay / Bx
         # Velocity of B, its components in the cable's plane and across it.
-        qx, qy, qz = wy * ez - wz * ey, wz * ex - wx * ez, wx * ey - wy * ex
-        vx, vy, vz = twist[3] + qx, twist[4] + qy, twist[5] + qz
+        turn = cross(omega, arm)
+        vx, vy, vz = twist[3] + turn[0], twist[4] + turn[1], twist[5] + turn[2]
         dBx = cx * vx + cy * vy
         dgamma = (cx * vy - cy * vx) / Bx
         tension = T_A[i] if T_A[i].real > 0.0 else 0.0 * T_A[i]
@@ -157,39 +167,29 @@ def length_rates(
             continue
         dH[i] = N3
         t = Bz / Bx
-        D[0, i], D[1, i], D[2, i] = ey * t - ez * cy, ez * cx - ex * t, ex * cy - ey * cx
-        D[3, i], D[4, i], D[5, i] = cx, cy, t
+        set_column(i, arm, (cx, cy, t), D)
         # Change of theta_B = H (x_A + t z) + (w L / 2) z at constant H, and of its moment about E.
         dL = (Bx * dBx + Bz * vz) / L
         gx, gy = -H * cy * dgamma, H * cx * dgamma
         gz = H * (vz - t * dBx) / Bx + 0.5 * w * dL
-        fx, fy, fz = H * cx, H * cy, H * t + 0.5 * w * L
-        change[0] += qy * fz - qz * fy + ey * gz - ez * gy
-        change[1] += qz * fx - qx * fz + ez * gx - ex * gz
-        change[2] += qx * fy - qy * fx + ex * gy - ey * gx
+        turned_moment = cross(turn, (H * cx, H * cy, H * t + 0.5 * w * L))
+        moment = cross(arm, (gx, gy, gz))
+        for a in range(3):
+            change[a] += turned_moment[a] + moment[a]
         change[3] += gx
         change[4] += gy
         change[5] += gz
     if model == SLSM and not np.any(run):
         return True
     # The weight's moment changes as G turns about E: d(EG x m g) = (omega x EG) x m g.
-    Gx = R[0, 0] * body[1] + R[0, 1] * body[2] + R[0, 2] * body[3]
-    Gy = R[1, 0] * body[1] + R[1, 1] * body[2] + R[1, 2] * body[3]
-    Gz = R[2, 0] * body[1] + R[2, 1] * body[2] + R[2, 2] * body[3]
-    change[0] += (wz * Gx - wx * Gz) * weight
-    change[1] -= (wy * Gz - wz * Gy) * weight
-    gram = np.zeros((6, 6), R.dtype)
-    for a in range(6):
-        for b in range(a + 1):
-            for i in range(k):
-                gram[a, b] += D[a, i] * D[b, i]
-    if not solve_symmetric(gram, change):
+    turn = cross(omega, turned(R, body[1:4]))
+    change[0] += turn[1] * weight
+    change[1] -= turn[0] * weight
+    lacking = np.zeros(k, R.dtype)
+    if not least_norm(D, change, lacking):
         return False
     for i in range(k):
-        rate = 0.0 * change[0]
-        for a in range(6):
-            rate -= D[a, i] * change[a]
-        rates[i] += dH[i] * rate
+        rates[i] -= dH[i] * lacking[i]
     return True
 
 
@@ -247,15 +247,13 @@ def pose_error_jacobian(z, X_PM, out, jacobian):
 
 
 @jit
-def motor_rates(
-    model, order, gain, limits, z, drawing, attachment, body, stiffness, run, X_PM, out
-):
+def motor_rates(model, order, gain, limits, z, points, body, stiffness, run, X_PM, out):
     """Evaluate the law: out = [motor rates (k); s_w; s_t], the rates times the transmission.
 
     z = [pose (6); desired pose (6); desired twist (6); T_A (k); tangents at A (3 k)]; X_PM (4, 3) =
     [R_PM; p_PM]; limits = [speed, angular speed]. Returns False at a rank below 6.
     """
-    k = drawing.shape[0]
+    k = run.shape[0]
     R = np.zeros((3, 3), z.dtype)
     R_M = np.zeros((3, 3), z.dtype)
     EM = np.zeros(3, z.dtype)
@@ -289,7 +287,7 @@ def motor_rates(
         out[k + a] = s[a]
     return length_rates(
         model, order, R, z[3:6], twist, z[18 : 18 + k], cos_alpha,
-        drawing, attachment, body, stiffness, run, out,
+        points, body, stiffness, run, out,
     )  # fmt: skip
 
 
@@ -313,7 +311,7 @@ def limit_twist(limits, EM, twist):
 
 @jit
 def motor_rates_jacobian(
-    model, order, gain, limits, z, drawing, attachment, body, stiffness, run, X_PM, out, jacobian
+    model, order, gain, limits, z, points, body, stiffness, run, X_PM, out, jacobian
 ):
     """Evaluate the law and its Jacobian (k + 6, n) with respect to z (n,), by complex steps."""
     n = z.shape[0]
@@ -325,9 +323,7 @@ def motor_rates_jacobian(
         zc[j] = zc[j] + STEP * 1j
         for i in range(out.shape[0]):
             yc[i] = 0.0
-        if not motor_rates(
-            model, order, gain, limits, zc, drawing, attachment, body, stiffness, run, X_PM, yc
-        ):
+        if not motor_rates(model, order, gain, limits, zc, points, body, stiffness, run, X_PM, yc):
             return False
         zc[j] = z[j]
         for i in range(out.shape[0]):

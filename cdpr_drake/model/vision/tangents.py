@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydrake.math import RigidTransform
 
+from cdpr_drake.model.kinematics import cable_ends
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array
 from cdpr_drake.model.vision.cameras import observers
@@ -107,8 +108,7 @@ class StereoGeometry:
         Args:
             X_WP: pose of the platform.
         """
-        ends = self.robot.attachment_points @ X_WP.rotation().matrix().T + X_WP.translation()
-        return ends - self.drawing
+        return cable_ends(self.robot, X_WP).chord
 
 
 class CableImages:
