@@ -18,6 +18,7 @@ from cdpr_drake.model.rotations import Array, as_pose, pose_to_vector
 from cdpr_drake.model.winch import WinchModel
 from cdpr_drake.systems.fused_plant import FusedPlant
 from cdpr_drake.systems.held_pose import HeldPose
+from cdpr_drake.systems.load_cell import LoadCellFilter
 from cdpr_drake.systems.plausible_tension import PlausibleTension
 from cdpr_drake.systems.stereo import StereoCameras
 
@@ -97,7 +98,7 @@ def set_at_rest(diagram: Diagram, context: Context, rest: RestState) -> None:
     _fill_samplers(systems, context)
 
 
-def _filters_at_rest(system: Any, tension: Array) -> Array:
+def _filters_at_rest(system: LoadCellFilter | FusedPlant, tension: Array) -> Array:
     """Return the state of a system's load cells under tensions (k,) [N] that do not change."""
     return np.tile(system.reading(tension), system.robot.load_cells.order)
 
