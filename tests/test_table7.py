@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.errors import EquilibriumError
-from cdpr_drake.experiments.reproduction import table7, table7_variations
+from cdpr_drake.experiments.reproduction import drag, table7, table7_variations
 from cdpr_drake.experiments.reproduction.assumptions import assumed, assumptions
 from cdpr_drake.experiments.reproduction.large_robot import (
     GOAL,
@@ -152,6 +152,13 @@ def test_an_undamped_mode_grows_at_half_the_gain(values: dict[str, Any]) -> None
         assert found["drag"] == pytest.approx(values["gain"], rel=0.05)
         assert found["drag"] < 0.6 * values["drag"]
         assert found["damping_time"] > 100 * values["damping_time"]
+
+
+def test_a_least_value_is_one_from_which_on_all_is_stable() -> None:
+    assert drag._least(lambda x: 0.3 - x, 1.0) == pytest.approx(0.3, rel=2e-3)
+    assert drag._least(lambda x: 2.0 - x, 1.0) == np.inf
+    with pytest.raises(ArithmeticError, match="alternate"):
+        drag._least(lambda x: (x - 0.1) * (x - 0.5), 1.0)  # grows again above 0.5
 
 
 def test_times_of_arrival_of_an_exponential() -> None:

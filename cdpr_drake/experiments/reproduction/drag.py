@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, Diagram, DiagramBuilder, LeafSystem
 
@@ -20,6 +21,9 @@ from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import pose_to_vector, vector_to_pose
 from cdpr_drake.study.platform import mass_matrix
 from cdpr_drake.study.stability import SampledServo
+
+SCANNED = 13
+"""Number of values over three decades at which stability is looked at."""
 
 
 class PlatformDrag(LeafSystem):
@@ -115,8 +119,14 @@ def what_it_takes(robot: CableRobot, pose: RigidTransform, gain: float) -> dict[
 
 
 def _least(growth: Callable[[float], float], highest: float) -> float:
-    """Return the least value with which nothing grows, to 0.1 %; infinite above the `highest`."""
-    if growth(highest) > 0.0:
+    """Return the least value with which nothing grows, to 0.1 %; infinite above the `highest`.
+
+    Values over three decades are looked at: growth has to end there once and for all.
+    """
+    grows = [growth(value) > 0.0 for value in np.geomspace(1e-3 * highest, highest, SCANNED)]
+    if grows != sorted(grows, reverse=True):
+        raise ArithmeticError("stable and unstable values alternate: there is no least one")
+    if grows[-1]:
         return math.inf
     low, high = 0.0, highest
     while high - low > 1e-3 * high:
