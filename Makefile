@@ -18,11 +18,11 @@ unexport PYTHONPATH PYTHONHOME
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help demo test lint bench warm clean
+.PHONY: help demo test lint bench reproduce warm clean
 
 help: ## this list
 	@echo "make TARGET [PYTHON=an interpreter for .venv] [ARGS=options passed on]"
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  %-6s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  %-9s %s\n", $$1, $$2 }' Makefile
 
 demo: $(INSTALLED)-demo ## a robot carries a load under vision-based control, and the plots of it
 	@$(BIN)/cdpr-drake run $(ARGS)
@@ -41,6 +41,9 @@ lint: $(INSTALLED)-dev ## linter, formatter (nothing is rewritten) and type chec
 
 bench: $(INSTALLED)-bench ## the benchmarks, beside other programs' (NAME with ARGS=NAME)
 	@$(BENCH) $(ARGS)
+
+reproduce: $(INSTALLED)-demo ## the paper's tables and figures made again, in out/reproduction
+	@$(BIN)/python -m reproduction $(ARGS)
 
 # Should it fail, the linter and the tests tell more.
 warm:

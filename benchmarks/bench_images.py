@@ -32,7 +32,6 @@ from cdpr_drake.diagrams.rendering import (  # noqa: E402
     make_pose_camera_images,
     rendering_available,
 )
-from cdpr_drake.experiments.paper_tests import paper_test  # noqa: E402
 from cdpr_drake.model.catenary import elastic_catenary  # noqa: E402
 from cdpr_drake.model.equilibrium import rest_state  # noqa: E402
 from cdpr_drake.model.kernels import is_compiled  # noqa: E402
@@ -43,6 +42,7 @@ from cdpr_drake.model.vision.cable_drawing import CableDrawing  # noqa: E402
 from cdpr_drake.model.vision.image_pose import ImagePoseEstimator  # noqa: E402
 from cdpr_drake.model.vision.lines import CableLines  # noqa: E402
 from cdpr_drake.model.vision.tangents import TangentEstimator  # noqa: E402
+from cdpr_drake.runs.paper_tests import paper_test  # noqa: E402
 
 LIMIT = 10.0  # ms, from pixels to motor rates when tracking
 GAIN, PERIOD = 0.1, 0.05  # 1/s, s

@@ -20,7 +20,7 @@ import numpy as np
 from benchmarks.harness import Contestant, Report, Spread, interleave, run
 from cdpr_drake.diagrams import make_simulator
 from cdpr_drake.diagrams.simulation import INTEGRATOR, MAX_STEP
-from cdpr_drake.experiments.runs import Prepared, prepare, setup_of_test
+from cdpr_drake.runs.running import Prepared, prepare, setup_of_test
 
 REFERENCE_STEP = 5e-4
 

@@ -21,8 +21,8 @@ from pydrake.systems.primitives import FirstOrderTaylorApproximation
 
 from benchmarks.harness import Contestant, Report, Spread, interleave, positive, ratio, run
 from cdpr_drake.diagrams import make_vision_based_control
-from cdpr_drake.experiments.paper_tests import paper_test
 from cdpr_drake.model.robot import load_robot
+from cdpr_drake.runs.paper_tests import paper_test
 from cdpr_drake.study import equilibrium, linearize
 
 PORTS = ("desired_pose",), ("pose_error",)

@@ -23,8 +23,8 @@ from benchmarks.loop_case import noise_of, numbers_of
 from benchmarks.solve_ivp_loop import Noise, Simulation, Start
 from cdpr_drake.diagrams import simulate
 from cdpr_drake.diagrams.simulation import MAX_STEP
-from cdpr_drake.experiments.runs import Prepared, Setup, prepare, setup_of_test
 from cdpr_drake.model.kernels import is_compiled
+from cdpr_drake.runs.running import Prepared, Setup, prepare, setup_of_test
 
 REFERENCE_STEP = 5e-4
 MUJOCO_STEP = 1e-3

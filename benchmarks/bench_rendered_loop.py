@@ -20,7 +20,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from cdpr_drake.diagrams.rendering import rendering_available  # noqa: E402
-from cdpr_drake.experiments.runs import prepare, run, setup_of_test  # noqa: E402
+from cdpr_drake.runs.running import prepare, run, setup_of_test  # noqa: E402
 
 POSITION, ORIENTATION = 10e-3, 0.5  # m, deg: the paper's accuracy
 LAST = 1.0  # s: the errors are the largest of these last

@@ -22,22 +22,24 @@ from typing import Any
 import numpy as np
 
 from benchmarks.harness import ROOT, Report, positive, run
-from cdpr_drake.diagrams import make_vision_based_control
-from cdpr_drake.experiments.paper_tests import paper_test
-from cdpr_drake.model.robot import CableRobot, load_robot
-from cdpr_drake.study import (
+from cdpr_drake.analysis import (
     comparable_pose,
-    equilibrium,
     gain_limit,
     gain_matrix,
-    linearize,
     map_gain_matrix,
+    stability_map,
+)
+from cdpr_drake.analysis.compare import ROBOTS
+from cdpr_drake.diagrams import make_vision_based_control
+from cdpr_drake.model.robot import CableRobot, load_robot
+from cdpr_drake.runs.paper_tests import paper_test
+from cdpr_drake.study import (
+    equilibrium,
+    linearize,
     one_period_map,
     simulate_modes,
     simulated_period_map,
-    stability_map,
 )
-from cdpr_drake.study.compare import ROBOTS
 
 sys.path.append(str(ROOT / "tests"))
 

@@ -17,8 +17,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.harness import Report, positive, run
-from cdpr_drake.experiments.monte_carlo import base_case, run_case
-from cdpr_drake.study.sweep import Sweep, sweep
+from cdpr_drake.batch.monte_carlo import base_case, run_case
+from cdpr_drake.batch.sweeps import Sweep, sweep
 
 MILLION = 1_000_000
 CLUSTER = 1000  # cores

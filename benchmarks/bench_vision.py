@@ -17,7 +17,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from benchmarks.harness import Contestant, Report, Spread, interleave, positive, run
-from cdpr_drake.experiments.paper_tests import paper_test
 from cdpr_drake.model.catenary import elastic_catenary
 from cdpr_drake.model.equilibrium import rest_state
 from cdpr_drake.model.robot import load_robot
@@ -26,6 +25,7 @@ from cdpr_drake.model.servo import MotorRateLaw, ServoSettings
 from cdpr_drake.model.vision.pose import PoseEstimator
 from cdpr_drake.model.vision.tangents import CableImages, TangentEstimator
 from cdpr_drake.model.vision.targets import TargetImages
+from cdpr_drake.runs.paper_tests import paper_test
 
 LIMIT = 3.0  # ms, from targets to motor rates
 PAPER = 40.0  # ms

@@ -10,8 +10,8 @@ from pydrake.systems.framework import Context, Diagram
 
 from benchmarks.solve_ivp_loop import Loop, Noise, Start
 from cdpr_drake.diagrams import leaf_systems
-from cdpr_drake.experiments.runs import Setup
 from cdpr_drake.model.equilibrium import rest_state
+from cdpr_drake.runs.running import Setup
 
 
 def numbers_of(setup: Setup) -> tuple[Loop, Start]:

@@ -20,7 +20,7 @@ __version__ = "0.2.0.dev0"
 
 __all__ = ["CableRobot", "__version__", "load_robot", "robot_names", "save_robot"]
 
-_ROOMS = ("diagrams", "experiments", "model", "show", "study", "systems")
+_ROOMS = ("analysis", "batch", "diagrams", "model", "runs", "show", "study", "systems")
 
 
 def __getattr__(name: str) -> Any:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from cdpr_drake.commands import UsageError
-from cdpr_drake.commands.parsing import parse
+from cdpr_drake.commands.parsing import Call, parse
 from cdpr_drake.commands.terminal import print_message, warnings_on_one_line
 
 
@@ -20,8 +20,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     Raises:
         SystemExit: after --help and --version.
     """
+    return carry_out(lambda: parse(sys.argv[1:] if argv is None else argv))
+
+
+def carry_out(parsed: Callable[[], Call]) -> int:
+    """Carry out a command and return its exit status, what went wrong in one line on stderr.
+
+    Args:
+        parsed: returns the command and its options.
+    """
     try:
-        command, options = parse(sys.argv[1:] if argv is None else argv)
+        command, options = parsed()
         with warnings_on_one_line():
             status = command.work(options)
         sys.stdout.flush()

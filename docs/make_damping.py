@@ -15,10 +15,10 @@ from typing import Any
 
 from pydrake.math import RigidTransform
 
-from cdpr_drake.experiments.moves import move_near_the_middle
-from cdpr_drake.experiments.paper_tests import paper_test, paper_tests
+from cdpr_drake.analysis import gain_limit, gain_limit_band, platform_modes
 from cdpr_drake.model.robot import CableRobot, load_robot
-from cdpr_drake.study import gain_limit, gain_limit_band, platform_modes
+from cdpr_drake.runs.moves import move_near_the_middle
+from cdpr_drake.runs.paper_tests import paper_test, paper_tests
 
 DOCS = Path(__file__).resolve().parent
 PAGE, BEFORE = DOCS / "damping.md", DOCS / "damping_before.json"

@@ -14,14 +14,15 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from cdpr_drake.__main__ import main
+from cdpr_drake.analysis import compare_cable_models
+from cdpr_drake.analysis.calibration_study import GROUPS, calibration_effect
 from cdpr_drake.diagrams import make_vision_based_control
-from cdpr_drake.experiments.calibration_study import GROUPS, calibration_effect
-from cdpr_drake.experiments.paper_tests import paper_test
 from cdpr_drake.model.catenary import elastic_catenary
 from cdpr_drake.model.equilibrium import rest_state
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.vision.cable_drawing import CableDrawing
 from cdpr_drake.model.vision.lines import CableLines
+from cdpr_drake.runs.paper_tests import paper_test
 from cdpr_drake.show import (
     block_diagram,
     calibration_study_figure,
@@ -32,7 +33,6 @@ from cdpr_drake.show import (
 )
 from cdpr_drake.show.explorer import Explorer
 from cdpr_drake.show.screenshot import screenshot
-from cdpr_drake.study import compare_cable_models
 
 IMAGES = Path(__file__).resolve().parent / "images"
 FIGURES = ("pose_error.png", "error_norm.png", "tension.png", "sag.png")

@@ -1,6 +1,6 @@
 """Write what the reproduction found into README.md and docs/reproduction.md, between their marks.
 
-    cdpr-drake reproduce --output DIR
+    python -m reproduction --output DIR
     python docs/make_reproduction.py DIR
 
 Without DIR, the report kept in docs/reproduction.json is taken, and the pictures stay.
@@ -16,7 +16,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from cdpr_drake.experiments.reproduction.words import (
+from reproduction.words import (
     count_of_claims,
     fitted_and_assumed,
     how_often,
@@ -43,7 +43,7 @@ def filled(page: str, report: Mapping[str, Any]) -> str:
     Args:
         page: Markdown, with lines `<!-- begin NAME -->` and `<!-- end NAME -->`; a name is that of
             a section, or summary, headline, parameters or effort.
-        report: as `cdpr-drake reproduce` writes it.
+        report: as `python -m reproduction` writes it.
 
     Raises:
         KeyError: there is nothing by the name of a mark.

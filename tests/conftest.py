@@ -7,9 +7,11 @@ import os
 import shutil
 import signal
 import subprocess
+import sys
 from collections.abc import Callable
 from functools import cache
 from importlib.metadata import version
+from pathlib import Path
 
 import hypothesis
 import pytest
@@ -18,6 +20,9 @@ from cdpr_drake.diagrams.rendering import rendering_available
 from cdpr_drake.model.robot import CableRobot, load_robot
 
 os.environ.setdefault("MPLBACKEND", "Agg")  # figures open no window
+
+# For `reproduction` and `benchmarks`; behind what is installed.
+sys.path.append(str(Path(__file__).resolve().parents[1]))
 
 # No deadline: a test must not fail because the machine is busy or numba compiles.
 hypothesis.settings.register_profile("cdpr_drake", hypothesis.settings.default, deadline=None)

@@ -8,16 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from cdpr_drake.experiments.reproduction.section import (
-    Case,
-    Claim,
-    Figure,
-    Line,
-    Panel,
-    Result,
-    Section,
-    Table,
-)
+from reproduction.section import Case, Claim, Figure, Line, Panel, Result, Section, Table
 
 
 def square(x: float, log: str = "") -> Result:

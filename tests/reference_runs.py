@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cdpr_drake.experiments.runs import RECORD_PERIOD, run, setup_of_test
+from cdpr_drake.runs.running import RECORD_PERIOD, run, setup_of_test
 
 FILE = Path(__file__).with_name("reference_runs.npz")
 

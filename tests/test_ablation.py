@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from cdpr_drake.__main__ import main
-from cdpr_drake.errors import RobotFileError
-from cdpr_drake.experiments import ablation
-from cdpr_drake.experiments.ablation import (
+from cdpr_drake.analysis import gain_limit
+from cdpr_drake.batch import Outcome, Sweep, ablation
+from cdpr_drake.batch.ablation import (
     METRICS,
     Ablation,
     Statistic,
@@ -24,9 +24,9 @@ from cdpr_drake.experiments.ablation import (
     sensor_sets,
     suitable_gain,
 )
+from cdpr_drake.errors import RobotFileError
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.show import ablation_figure
-from cdpr_drake.study import Outcome, Sweep, gain_limit
 
 
 def test_sensors_are_taken_away_one_kind_at_a_time(cogiro: CableRobot) -> None:
@@ -170,7 +170,7 @@ def test_the_command_tells_it_and_writes_it_down(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setenv("COLUMNS", "70")
-    monkeypatch.setattr("cdpr_drake.experiments.ablation.ablate", lambda *args, **options: canned)
+    monkeypatch.setattr("cdpr_drake.batch.ablation.ablate", lambda *args, **options: canned)
     folder = tmp_path / "out"
     assert main(["ablate", "--robot", "cogiro", "--output", str(folder)]) == 0
     out = capsys.readouterr().out

@@ -25,15 +25,16 @@ PACKAGE = ROOT / "cdpr_drake"
 # A module imports only from its own layer and from lower ones.
 LAYERS = {
     "errors": 0,
-    "batch": 0,
     "model": 1,
     "systems": 2,
     "diagrams": 3,
     "study": 4,
-    "experiments": 5,
-    "show": 5,
-    "commands": 6,
-    "__main__": 7,
+    "analysis": 4,
+    "runs": 5,
+    "batch": 6,
+    "show": 6,
+    "commands": 7,
+    "__main__": 8,
 }
 HEAVY = ("cv2", "scipy.optimize", "matplotlib", "numba")
 
@@ -93,14 +94,14 @@ def test_imports_flow_one_way(name: str) -> None:
     assert not misplaced_imports(name, SOURCES[name])
 
 
-def test_experiments_and_show_do_not_import_each_other_both_ways() -> None:
+def test_batch_and_show_do_not_import_each_other_both_ways() -> None:
     leaning = {
         (name.split(".")[1], target.split(".")[1])
         for name, path in SOURCES.items()
         for _, target in imports(name, path)
         if name.count(".") and target.startswith("cdpr_drake.")
     }
-    assert not {("experiments", "show"), ("show", "experiments")} <= leaning
+    assert not {("batch", "show"), ("show", "batch")} <= leaning
 
 
 @pytest.mark.parametrize(
@@ -147,7 +148,7 @@ def test_no_star_import_and_no_pydrake_all(name: str) -> None:
 
 DRAWING_POINTS = {"p_WA", "drawing", "drawing_points", "_A"}
 KERNELS = "cdpr_drake.model.kernels."
-BATCHED = "cdpr_drake.experiments.reproduction.sag_search"
+BATCHED = "reproduction.sag_search"
 """Robots and poses by the thousand in one array; its tests hold it to the package's functions."""
 
 ONCE = {

@@ -18,7 +18,6 @@ from scipy.ndimage import gaussian_filter
 from system_checks import documented_ports, feedthrough, fixed_context, input_sizes, output_sizes
 from test_vision_tangents import CENTRE, angles, cables_at
 
-from cdpr_drake.experiments.paper_tests import paper_test
 from cdpr_drake.model.kernels import cable_lines as kernel
 from cdpr_drake.model.kernels import stereo, vision
 from cdpr_drake.model.robot import CableRobot, load_robot
@@ -27,6 +26,7 @@ from cdpr_drake.model.vision.cable_drawing import CABLE, PANEL, CableDrawing
 from cdpr_drake.model.vision.lines import CableLines
 from cdpr_drake.model.vision.outages import Outage
 from cdpr_drake.model.vision.tangents import CableImages, StereoGeometry, TangentEstimator
+from cdpr_drake.runs.paper_tests import paper_test
 from cdpr_drake.show import stereo_view_figure
 from cdpr_drake.systems import StereoImageCameras, StereoTangentCameras
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cdpr_drake.experiments import paper_test, run, setup_of_test
-from cdpr_drake.experiments.calibration_study import (
+from cdpr_drake.analysis.calibration_study import (
     GROUPS,
     calibration_effect,
     errors_of,
@@ -20,6 +19,7 @@ from cdpr_drake.experiments.calibration_study import (
 )
 from cdpr_drake.model.calibration_errors import CalibrationErrors, misjudged
 from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.runs import paper_test, run, setup_of_test
 from cdpr_drake.show import calibration_study_figure
 
 Poses = tuple[RigidTransform, RigidTransform]

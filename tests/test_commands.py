@@ -16,8 +16,8 @@ from cdpr_drake.__main__ import main
 from cdpr_drake.commands.parsing import parse
 from cdpr_drake.commands.registry import BUILT_IN, GROUP, built_in_commands
 from cdpr_drake.commands.resolve import resolve_move, resolve_place
-from cdpr_drake.experiments import paper_test
 from cdpr_drake.model.robot import load_robot
+from cdpr_drake.runs import paper_test
 
 WEIGH = '''
 """A command of another package, a file of its own."""

@@ -19,7 +19,6 @@ from system_checks import documented_ports, feedthrough, output_sizes
 from cdpr_drake.__main__ import main
 from cdpr_drake.diagrams import make_vision_based_control, rendering, rest_context, simulate
 from cdpr_drake.errors import GeometryError, RenderingError, RobotFileError, SimulationError
-from cdpr_drake.experiments.paper_tests import paper_test
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.rotations import pose_to_vector, vector_to_pose
 from cdpr_drake.model.vision.blobs import find_all, find_near
@@ -29,6 +28,7 @@ from cdpr_drake.model.vision.lens import Lens
 from cdpr_drake.model.vision.outages import Outage
 from cdpr_drake.model.vision.pattern_search import labellings
 from cdpr_drake.model.vision.targets import TargetImages
+from cdpr_drake.runs.paper_tests import paper_test
 from cdpr_drake.show import camera_view_figure, camera_views
 from cdpr_drake.systems import ImageTargets, LensDistortion
 

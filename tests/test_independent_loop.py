@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr_drake.experiments.runs import Setup, prepare, run, setup_of_test
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.rotations import vector_to_pose
+from cdpr_drake.runs.running import Setup, prepare, run, setup_of_test
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))  # behind what is installed
 

@@ -13,8 +13,6 @@ from system_checks import check_derivatives, fixed_context
 
 from cdpr_drake.diagrams import make_vision_based_control, rest_context, simulate
 from cdpr_drake.errors import TensionError
-from cdpr_drake.experiments.moves import move_near_the_middle
-from cdpr_drake.experiments.paper_tests import paper_test
 from cdpr_drake.model.cable_models import cable_angles
 from cdpr_drake.model.equilibrium import rest_state
 from cdpr_drake.model.kinematics import cable_geometry
@@ -32,6 +30,8 @@ from cdpr_drake.model.rotations import pose_to_vector
 from cdpr_drake.model.servo import MotorRateLaw, ServoSettings
 from cdpr_drake.model.statics import bounded_distribution, weight_wrench, wrench_matrix
 from cdpr_drake.model.vision.outages import Outage
+from cdpr_drake.runs.moves import move_near_the_middle
+from cdpr_drake.runs.paper_tests import paper_test
 from cdpr_drake.systems import PlausibleTension
 
 ROBOTS = ("cogiro", "cogiro-2015-pulleys", "cogiro-22m", "cogiro-37m", "cogiro-98m")

@@ -18,11 +18,11 @@ from cdpr_drake.diagrams import (
     simulate,
     with_reference,
 )
-from cdpr_drake.experiments.paper_tests import paper_test
 from cdpr_drake.model.catenary import cable_energy, elastic_catenary
 from cdpr_drake.model.kernels import is_compiled
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import pose_to_vector, vector_to_pose
+from cdpr_drake.runs.paper_tests import paper_test
 from cdpr_drake.systems import ExponentialApproach
 
 GAIN = 0.1

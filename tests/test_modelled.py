@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from system_checks import documented_ports, feedthrough, input_sizes, output_sizes
 
+from cdpr_drake.analysis import comparable_pose, gain_matrix
+from cdpr_drake.analysis.modelled_gain import modelled_gain_matrix
 from cdpr_drake.diagrams import leaf_systems, make_vision_based_control, rest_context, simulate
 from cdpr_drake.errors import SimulationError
-from cdpr_drake.experiments import run, setup_of_test
-from cdpr_drake.experiments.modelled_gain import modelled_gain_matrix
 from cdpr_drake.model.equilibrium import rest_state
 from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.modelled import modelled_tangents, modelled_tensions
+from cdpr_drake.model.rest_model import rest_model
 from cdpr_drake.model.robot import CableRobot, load_robot
-from cdpr_drake.study import comparable_pose, gain_matrix
-from cdpr_drake.study.platform import rest_model
+from cdpr_drake.runs import run, setup_of_test
 from cdpr_drake.systems import ModelledTangents, ModelledTension
 
 POSE = np.array([0.02, -0.03, 0.05, 0.4, -0.3, 1.2])

@@ -21,24 +21,19 @@ import pytest
 from conftest import find_chromium
 from fake_paper import FakeTable
 
-from cdpr_drake.__main__ import main
-from cdpr_drake.experiments.reproduction import figures, figures_claims, poses, sources
-from cdpr_drake.experiments.reproduction import reproduce as machinery
-from cdpr_drake.experiments.reproduction.assumptions import printed
-from cdpr_drake.experiments.reproduction.null_models import (
-    chance_of_cables,
-    chance_of_order,
-    share,
-    within,
-)
-from cdpr_drake.experiments.reproduction.registry import reproductions
-from cdpr_drake.experiments.reproduction.reproduce import report_of, reproduce
-from cdpr_drake.experiments.reproduction.section import Claim, Figure, Reproduction, kind_by
-from cdpr_drake.experiments.reproduction.traces import difference, rate, sizes
-from cdpr_drake.experiments.reproduction.words import count_of_claims, in_words
-from cdpr_drake.show.paper_figures import panel_svg, paper_figure
-from cdpr_drake.show.report import report_html
-from cdpr_drake.study.sweep_store import fingerprint, name_of
+from cdpr_drake.batch.store import fingerprint, name_of
+from reproduction import figures, figures_claims, poses, sources
+from reproduction import reproduce as machinery
+from reproduction.__main__ import main
+from reproduction.assumptions import printed
+from reproduction.null_models import chance_of_cables, chance_of_order, share, within
+from reproduction.paper_figures import panel_svg, paper_figure
+from reproduction.registry import reproductions
+from reproduction.report import report_html
+from reproduction.reproduce import report_of, reproduce
+from reproduction.section import Claim, Figure, Reproduction, kind_by
+from reproduction.traces import difference, rate, sizes
+from reproduction.words import count_of_claims, in_words
 
 ROOT = Path(__file__).resolve().parents[1]
 VOID = {"meta", "br", "hr", "img", "link", "input"}
@@ -89,7 +84,7 @@ def test_cases_can_be_handed_to_other_processes_and_kept(name: str) -> None:
     assert keys and len(set(keys)) == len(keys)
     assert all(re.fullmatch(r"[\w.+-]+", key) for key in keys)
     for case in cases:
-        assert name_of(case.function).startswith("cdpr_drake.")
+        assert name_of(case.function).startswith("reproduction.")
         assert fingerprint(dict(case.arguments))
         json.dumps(dict(case.arguments))
 
@@ -133,19 +128,20 @@ def test_what_was_done_by_the_same_source_is_not_done_again(
 
 
 def test_a_source_changes_with_the_code_and_data_it_depends_on(tmp_path: Path) -> None:
-    package = tmp_path / "ours"
+    package = tmp_path / "reproduction"
     files = {
         "__init__.py": "",
-        "runs.py": "from ours.model import robot\ndef run(): return robot.mass, load('table4')\n",
+        "runs.py": "from reproduction.model import robot\n"
+        "def run(): return robot.mass, load('table4')\n",
         "model/__init__.py": "",
         "model/robot.py": "import numpy\nmass = 1\n",
-        "model/other.py": "import ours.runs\nx = 1\n",
+        "model/other.py": "import reproduction.runs\nx = 1\n",
         "assumptions.yaml": "table4: {a: 1}\ntable5: {a: 1}\n",
         "robot.yaml": "mass: 1\n",
     }
     changes = {
         "runs.py": files["runs.py"] + "y = 1\n",
-        "model/__init__.py": "from ours.model import other\n",
+        "model/__init__.py": "from reproduction.model import other\n",
         "model/robot.py": "import numpy\nmass = 2\n",
         "assumptions.yaml": "table4: {a: 2}\ntable5: {a: 1}\n",
         "robot.yaml": "mass: 2\n",
@@ -157,11 +153,11 @@ def test_a_source_changes_with_the_code_and_data_it_depends_on(tmp_path: Path) -
     }
 
     def source(number: int, changed: dict[str, str]) -> str:
-        copy = package.parent / str(number) / "ours"
+        copy = package.parent / str(number) / "reproduction"
         for name, text in {**files, **changed}.items():
             (copy / name).parent.mkdir(parents=True, exist_ok=True)
             (copy / name).write_text(text)
-        return sources._source_of_module("ours.runs", copy)
+        return sources._source_of_module("reproduction.runs", copy.parent)
 
     first = source(0, {})
     number = 0
@@ -174,17 +170,17 @@ def test_a_source_changes_with_the_code_and_data_it_depends_on(tmp_path: Path) -
 
 
 def test_a_source_knows_all_that_comes_with_a_module() -> None:
-    found = sources.imported_by("cdpr_drake.experiments.reproduction.traces")
-    for name in ("experiments.runs", "model.kernels.catenary", "systems.servo", "study.stability"):
+    found = sources.imported_by("reproduction.traces")
+    for name in ("runs.running", "model.kernels.catenary", "systems.servo", "analysis.stability"):
         assert f"cdpr_drake.{name}" in found
-    assert "cdpr_drake.experiments.reproduction.figures" not in found
+    assert "reproduction.figures" not in found
     assert not any(name.startswith("cdpr_drake.show") for name in found)
     code = (
-        "import sys, cdpr_drake.experiments.reproduction.traces\n"
-        "print(*(n for n in sys.modules if n.partition('.')[0] == 'cdpr_drake'))"
+        "import sys, reproduction.traces\n"
+        "print(*(n for n in sys.modules if n.partition('.')[0] in ('cdpr_drake', 'reproduction')))"
     )
     loaded = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
     )
     assert set(loaded.stdout.split()) <= found
 
@@ -422,8 +418,8 @@ def test_the_command_writes_a_report_and_tells_what_it_found(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     fakes = {"one": FakeTable("one", [1.0, 2.0]), "two": FakeTable("two", [-2.0])}
-    monkeypatch.setattr("cdpr_drake.experiments.reproduction.registry.reproductions", lambda: fakes)
-    assert main(["reproduce", "--only", "one", "--jobs", "1"]) == 0
+    monkeypatch.setattr("reproduction.registry.reproductions", lambda: fakes)
+    assert main(["--only", "one", "--jobs", "1"]) == 0
     out, err = capfd.readouterr()
     assert "2 of 2 cases, in " in err
     lines = out.splitlines()
@@ -439,7 +435,7 @@ def test_the_command_writes_a_report_and_tells_what_it_found(
     assert [section["name"] for section in report["sections"]] == ["one"]
     assert (folder / "one.png").read_bytes().startswith(b"\x89PNG")
 
-    assert main(["reproduce", "--json", "--jobs", "1"]) == 1  # the second has a case that fails
+    assert main(["--json", "--jobs", "1"]) == 1  # the second has a case that fails
     out, err = capfd.readouterr()
     assert "3 of 3 cases, 2 of them earlier, in " in err
     assert [section["name"] for section in json.loads(out)["sections"]] == ["one", "two"]
@@ -455,7 +451,7 @@ def test_an_interrupted_command_says_how_to_go_on(
         raise KeyboardInterrupt
 
     monkeypatch.setattr(machinery, "reproduce", interrupted)
-    assert main(["reproduce"]) == 130
+    assert main([]) == 130
     err = capsys.readouterr().err
     assert "1 of 2 cases" in err and "the same command goes on" in err
 
@@ -474,7 +470,7 @@ def test_bad_input_costs_one_line(
     argv: list[str], message: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     (tmp_path / "file").write_text("")
-    assert main(["reproduce", *argv]) == 2
+    assert main(argv) == 2
     out, err = capsys.readouterr()
     assert out == "" and len(err.splitlines()) == 1 and re.search(message, err)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]

@@ -7,18 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cdpr_drake.experiments.paper_tests import paper_test
-from cdpr_drake.experiments.reproduction import cable_modes, slips
-from cdpr_drake.experiments.reproduction.printed_equations import (
+from cdpr_drake.model.cable_models import instantaneous_row, unstrained_length
+from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.servo import D_a, servo_twist
+from cdpr_drake.runs.paper_tests import paper_test
+from reproduction import cable_modes, slips
+from reproduction.printed_equations import (
     SLIPS,
     ecm,
     length_rates,
     printed_a,
     servo_twist_by_inversion,
 )
-from cdpr_drake.model.cable_models import instantaneous_row, unstrained_length
-from cdpr_drake.model.robot import CableRobot
-from cdpr_drake.model.servo import D_a, servo_twist
 
 CABLE = (np.array([7.0, 7.5]), np.array([-4.0, -3.0]), np.array([400.0, 60.0]), 0.65727, 1.3e6)
 

@@ -11,19 +11,13 @@ import numpy as np
 import pytest
 
 from cdpr_drake.__main__ import main
+from cdpr_drake.analysis import StabilityWarning, comparable_pose, gain_limit, gain_matrix
 from cdpr_drake.commands.terminal import counted
 from cdpr_drake.diagrams import make_vision_based_control
-from cdpr_drake.experiments import Setup, prepare, setup_of_test
-from cdpr_drake.experiments.runs import doubt_about_gain
 from cdpr_drake.model.robot import load_robot
-from cdpr_drake.study import (
-    StabilityWarning,
-    comparable_pose,
-    equilibrium,
-    gain_limit,
-    gain_matrix,
-    linearize,
-)
+from cdpr_drake.runs import Setup, prepare, setup_of_test
+from cdpr_drake.runs.running import doubt_about_gain
+from cdpr_drake.study import equilibrium, linearize
 
 MAP = ("--map", "--gains", "0.3,9,4", "--latencies", "0,0.1,3")
 

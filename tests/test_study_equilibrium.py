@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from study_samples import POSE, miscalibrated
 
+from cdpr_drake.analysis import comparable_pose
 from cdpr_drake.diagrams import (
     make_cable_robot,
     make_joint_space_control,
@@ -22,7 +23,7 @@ from cdpr_drake.model.inverse_kinematics import InverseKinematics
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.rotations import pose_to_vector
 from cdpr_drake.model.servo import pose_error
-from cdpr_drake.study import comparable_pose, equilibrium, residuals, true_pose
+from cdpr_drake.study import equilibrium, residuals, true_pose
 
 LOOPS = {
     "robot": make_cable_robot,

@@ -9,21 +9,12 @@ import numpy as np
 import pytest
 from study_samples import POSE
 
+from cdpr_drake.analysis import internal_tension, neutral_directions, platform_modes
 from cdpr_drake.diagrams import make_cable_robot, make_vision_based_control
 from cdpr_drake.model.equilibrium import rest_state
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.statics import wrench_matrix
-from cdpr_drake.study import (
-    Modes,
-    OnePeriodMap,
-    equilibrium,
-    internal_tension,
-    linearize,
-    modes,
-    neutral_directions,
-    one_period_map,
-    platform_modes,
-)
+from cdpr_drake.study import Modes, OnePeriodMap, equilibrium, linearize, modes, one_period_map
 from cdpr_drake.study.modes import named
 
 

@@ -9,6 +9,17 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from cdpr_drake.analysis import (
+    Comparison,
+    GainMap,
+    SampledServo,
+    StabilityMap,
+    comparable_pose,
+    compare_cable_models,
+    map_gain_matrix,
+    platform_modes,
+    stability_map,
+)
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.show import (
     gain_map_figure,
@@ -18,19 +29,7 @@ from cdpr_drake.show import (
     stability_figure,
 )
 from cdpr_drake.show.study_plots import sideways
-from cdpr_drake.study import (
-    Comparison,
-    GainMap,
-    Modes,
-    SampledServo,
-    StabilityMap,
-    comparable_pose,
-    compare_cable_models,
-    map_gain_matrix,
-    modes,
-    platform_modes,
-    stability_map,
-)
+from cdpr_drake.study import Modes, modes
 
 
 @pytest.fixture(scope="module")

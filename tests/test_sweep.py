@@ -19,10 +19,10 @@ import numpy as np
 import pytest
 from sweep_functions import deadly, noisy, nothing, picky, slow
 
-from cdpr_drake.batch import ARRAY, plain
+from cdpr_drake.batch.job import ARRAY, plain
+from cdpr_drake.batch.store import fingerprint, read_parts, write_part
+from cdpr_drake.batch.sweeps import Sweep, case_seed, sweep
 from cdpr_drake.errors import SweepError
-from cdpr_drake.study.sweep import Sweep, case_seed, sweep
-from cdpr_drake.study.sweep_store import fingerprint, read_parts, write_part
 
 CASES = [{"x": float(i)} for i in range(7)]
 
@@ -315,7 +315,7 @@ def test_what_an_executor_loses_is_one_case_only() -> None:
 SCRIPT = """
 import sys
 from sweep_functions import slow
-from cdpr_drake.study import sweep
+from cdpr_drake.batch import sweep
 if __name__ == "__main__":
     folder = sys.argv[1]
     cases = [{"x": x, "folder": folder} for x in range(40)]

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from cdpr_drake.__main__ import main
-from cdpr_drake.experiments import run
-from cdpr_drake.experiments.monte_carlo import METRICS, base_case, draw, run_case
+from cdpr_drake.batch.monte_carlo import METRICS, base_case, draw, run_case
+from cdpr_drake.batch.sweeps import case_seed, sweep
 from cdpr_drake.model.robot import load_robot
+from cdpr_drake.runs import run
 from cdpr_drake.show.sweep_plots import sweep_figure
-from cdpr_drake.study.sweep import case_seed, sweep
 
 SHORT = ("--until", "0.5", "--cases", "3", "--jobs", "1")
 

@@ -5,13 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr_drake.experiments import setup_of_test
-from cdpr_drake.experiments.reproduction import explanations as e
-from cdpr_drake.experiments.reproduction import table4, table4_work
-from cdpr_drake.experiments.reproduction.assumptions import assumptions, printed
-from cdpr_drake.experiments.reproduction.structure import Structure, joint_space_end
+from cdpr_drake.analysis import gain_matrix
 from cdpr_drake.model.cable_models import CABLE_MODELS
-from cdpr_drake.study import equilibrium, gain_matrix
+from cdpr_drake.runs import setup_of_test
+from cdpr_drake.study import equilibrium
+from reproduction import explanations as e
+from reproduction import table4, table4_work
+from reproduction.assumptions import assumptions, printed
+from reproduction.structure import Structure, joint_space_end
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -47,7 +48,7 @@ def test_friction_stretches_the_run_alone():
     """To first order the run of a cable stretches by T run / EA, times what friction adds."""
     robot = setup_of_test(3).robot
     setup, structure = setup_of_test(3), Structure(modulus=100.0)
-    from cdpr_drake.experiments.reproduction.structure import joint_space_rest
+    from reproduction.structure import joint_space_rest
 
     ends = [
         joint_space_rest(Structure(modulus=100.0, friction=f), robot, setup.goal, -np.ones(8))

@@ -6,15 +6,11 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from cdpr_drake.experiments import run, setup_of_test
-from cdpr_drake.experiments.reproduction import table5, table5_claims, table5_work
-from cdpr_drake.experiments.reproduction.assumptions import assumptions
-from cdpr_drake.experiments.reproduction.believed import Eyes, setup_from
-from cdpr_drake.experiments.reproduction.convergence import (
-    crossing_time,
-    median_interval,
-    noiseless_error,
-)
+from cdpr_drake.runs import run, setup_of_test
+from reproduction import table5, table5_claims, table5_work
+from reproduction.assumptions import assumptions
+from reproduction.believed import Eyes, setup_from
+from reproduction.convergence import crossing_time, median_interval, noiseless_error
 
 
 def test_an_exponential_crosses_a_level_when_it_should():

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cdpr_drake.experiments.reproduction import table6, table6_work
-from cdpr_drake.experiments.reproduction.assumptions import assumptions
-from cdpr_drake.experiments.reproduction.sag_search import NAMES, ScaledRobots, search
 from cdpr_drake.model.robot import load_robot
+from reproduction import table6, table6_work
+from reproduction.assumptions import assumptions
+from reproduction.sag_search import NAMES, ScaledRobots, search
 
 RANGES = {
     n: (a.low, a.high) for n, a in assumptions("table6").items() if n in NAMES and n != "mass"

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from cdpr_drake.errors import EquilibriumError
-from cdpr_drake.experiments.reproduction import drag, table7, table7_variations
-from cdpr_drake.experiments.reproduction.assumptions import assumed, assumptions
-from cdpr_drake.experiments.reproduction.large_robot import (
+from cdpr_drake.model.robot import load_robot
+from cdpr_drake.model.servo import ServoSettings
+from reproduction import drag, table7, table7_variations
+from reproduction.assumptions import assumed, assumptions
+from reproduction.large_robot import (
     GOAL,
     MODELS,
     START,
@@ -21,11 +23,9 @@ from cdpr_drake.experiments.reproduction.large_robot import (
     time_to,
     true_robot,
 )
-from cdpr_drake.experiments.reproduction.quasi_static import run_quasi_static
-from cdpr_drake.experiments.reproduction.table7_claims import ALONG, excursions, one_for_three
-from cdpr_drake.experiments.reproduction.table7_variations import slow_errors, variations, vary
-from cdpr_drake.model.robot import load_robot
-from cdpr_drake.model.servo import ServoSettings
+from reproduction.quasi_static import run_quasi_static
+from reproduction.table7_claims import ALONG, excursions, one_for_three
+from reproduction.table7_variations import slow_errors, variations, vary
 
 
 @pytest.fixture(scope="module")

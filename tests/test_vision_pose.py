@@ -11,7 +11,6 @@ from pydrake.math import RigidTransform, RotationMatrix
 from samples import jacobian, random_pose
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.experiments.paper_tests import paper_test
 from cdpr_drake.model.kernels import vision as kernel
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.rotations import exp_rotation, log_rotation, skew
@@ -29,6 +28,7 @@ from cdpr_drake.model.vision.targets import (
     TargetImages,
     pack_camera,
 )
+from cdpr_drake.runs.paper_tests import paper_test
 
 BOTH = pytest.mark.parametrize("estimator", ["joint", "mean"])
 CENTRE = RigidTransform([0.3, -0.2, 1.0])

@@ -20,10 +20,10 @@ from test_vision_tangents import angles, cables_at
 
 from cdpr_drake.diagrams import make_vision_based_control, rest_context, simulate
 from cdpr_drake.errors import GeometryError, RobotFileError, SimulationError
-from cdpr_drake.experiments.paper_tests import paper_test
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import pose_to_vector
 from cdpr_drake.model.vision.outages import Outage
+from cdpr_drake.runs.paper_tests import paper_test
 from cdpr_drake.systems import (
     LoadCellFilter,
     StereoTangentCameras,

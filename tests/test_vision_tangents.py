@@ -11,12 +11,12 @@ from pydrake.math import RigidTransform
 from samples import random_pose
 
 from cdpr_drake.errors import RobotFileError
-from cdpr_drake.experiments.paper_tests import paper_test
 from cdpr_drake.model.catenary import cable_shape, elastic_catenary
 from cdpr_drake.model.equilibrium import rest_state
 from cdpr_drake.model.kernels import stereo as kernel
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.vision.tangents import CableImages, TangentEstimator
+from cdpr_drake.runs.paper_tests import paper_test
 
 CENTRE = RigidTransform([0.2, -0.3, 0.9])
 

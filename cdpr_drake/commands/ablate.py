@@ -14,7 +14,7 @@ from cdpr_drake.commands.results import UNITS
 from cdpr_drake.commands.terminal import CaseProgress, Column, fitted_table, wrapped
 
 if TYPE_CHECKING:
-    from cdpr_drake.experiments.ablation import Ablation, Statistic, Worth
+    from cdpr_drake.batch.ablation import Ablation, Statistic, Worth
 
 ROBOTS = ("cogiro", "cogiro-98m")
 
@@ -38,7 +38,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _ablate(options: Namespace) -> int:
-    from cdpr_drake.experiments.ablation import ablate
+    from cdpr_drake.batch.ablation import ablate
 
     robots = list(dict.fromkeys(options.robot or ROBOTS))
     progress = CaseProgress()
@@ -138,7 +138,7 @@ def _summary(options: Namespace, found: Sequence[Ablation]) -> dict[str, Any]:
 
 
 def _values(row: Worth) -> dict[str, Any]:
-    from cdpr_drake.experiments.ablation import METRICS
+    from cdpr_drake.batch.ablation import METRICS
 
     values: dict[str, Any] = {
         "pose_cameras": row.sensors.pose_cameras,

@@ -20,7 +20,7 @@ from cdpr_drake.commands.resolve import (
 from cdpr_drake.commands.terminal import Column, counted, fitting, table, width_of, wrapped
 
 if TYPE_CHECKING:
-    from cdpr_drake.study import Comparison, DefaultGain, ModelComparison
+    from cdpr_drake.analysis import Comparison, DefaultGain, ModelComparison
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
@@ -73,9 +73,9 @@ COMMAND = Command(
 
 def _compare(options: Namespace) -> Comparison:
     """Return the comparison, a robot at a time, with the count of them on stderr."""
+    from cdpr_drake.analysis import Comparison, compare_cable_models
+    from cdpr_drake.analysis.compare import ROBOTS
     from cdpr_drake.model.cable_models import CABLE_MODELS
-    from cdpr_drake.study import Comparison, compare_cable_models
-    from cdpr_drake.study.compare import ROBOTS
 
     names = list(dict.fromkeys(options.robot or ROBOTS))
     models = list(dict.fromkeys(options.cable_model or CABLE_MODELS))
@@ -92,7 +92,7 @@ def _compare(options: Namespace) -> Comparison:
 def _lowest_gain(options: Namespace, comparison: Comparison) -> DefaultGain:
     """Return the gain that is good for all rows: they are drawn at one."""
 
-    from cdpr_drake.study import default_gain, lowest_gain
+    from cdpr_drake.analysis import default_gain, lowest_gain
 
     found, rule = [], options.tensions
     for row in comparison.rows:

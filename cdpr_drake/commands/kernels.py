@@ -53,7 +53,7 @@ def compile_ahead() -> None:
     """Compile the kernels that the default run needs, unless that was done before."""
     from cdpr_drake.commands.parsing import parse
     from cdpr_drake.commands.run import plan
-    from cdpr_drake.experiments import prepare
+    from cdpr_drake.runs import prepare
 
     with compilation_announced():
         for setup in plan(parse(["run"]).options).setups:

@@ -46,15 +46,29 @@ def parse(argv: Sequence[str]) -> Call:
     if name.startswith("-"):
         _program_parser(with_list=name in ("-h", "--help")).parse_args(argv or ["--help"])
         raise UsageError(f"no command (try {PROGRAM} --help)")
-    command = find_command(name)
+    return parse_for(find_command(name), f"{PROGRAM} {name}", rest)
+
+
+def parse_for(command: Command, program: str, argv: Sequence[str]) -> Call:
+    """Return a command and its options.
+
+    Args:
+        command: the command.
+        program: what users type to call it.
+        argv: its arguments.
+
+    Raises:
+        UsageError: they do not make sense.
+        SystemExit: after --help.
+    """
     parser = _parser(
-        f"{PROGRAM} {name}",
+        program,
         command.description,
-        [f"Example:\n  {PROGRAM} {name} {command.example}".rstrip()],
+        [f"Example:\n  {program} {command.example}".rstrip()],
         command.exit_status,
     )
     command.add_arguments(parser)
-    return Call(command, parser.parse_args(_attach_negative_values(rest)))
+    return Call(command, parser.parse_args(_attach_negative_values(argv)))
 
 
 def _program_parser(with_list: bool) -> _Parser:

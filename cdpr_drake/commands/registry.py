@@ -26,7 +26,6 @@ BUILT_IN = (
     "calibrate",
     "sweep",
     "ablate",
-    "reproduce",
     "robots",
 )
 """Each a module here, in the order of the list of commands."""

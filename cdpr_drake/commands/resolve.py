@@ -15,9 +15,9 @@ from cdpr_drake.commands.kernels import compilation_announced
 if TYPE_CHECKING:
     from pydrake.math import RigidTransform
 
-    from cdpr_drake.experiments import PaperTest
+    from cdpr_drake.analysis import DefaultGain
     from cdpr_drake.model.robot import CableRobot
-    from cdpr_drake.study import DefaultGain
+    from cdpr_drake.runs import PaperTest
 
 DEFAULT_TEST = 4
 
@@ -84,8 +84,8 @@ def resolve_place(
         robot: name or file; that of the options if None.
         default_test: at whose goal CoGiRo is without test and pose, if at any.
     """
+    from cdpr_drake.analysis import comparable_pose
     from cdpr_drake.model.rotations import as_pose
-    from cdpr_drake.study import comparable_pose
 
     default_test = default_test if options.pose is None else None
     found, number, test = _robot_and_test(options, robot or options.robot, default_test)
@@ -103,7 +103,7 @@ def resolve_move(options: Namespace) -> Move:
     Args:
         options: with robot, payload, test, start, goal and tensions.
     """
-    from cdpr_drake.experiments.moves import move_near_the_middle
+    from cdpr_drake.runs.moves import move_near_the_middle
 
     robot, number, test = _robot_and_test(options, options.robot, DEFAULT_TEST)
     start, goal = move_near_the_middle(robot) if test is None else test.poses(robot)
@@ -113,8 +113,8 @@ def resolve_move(options: Namespace) -> Move:
 
 def resolve_robot(name: str | None) -> CableRobot:
     """Return the robot of a `name` or file, that of the paper if None."""
-    from cdpr_drake.experiments.paper_tests import paper_tests
     from cdpr_drake.model.robot import load_robot
+    from cdpr_drake.runs.paper_tests import paper_tests
 
     return load_robot(name if name is not None else paper_tests().robot)
 
@@ -133,7 +133,7 @@ def resolve_gain(
 
     The loop is at a `place`, with a `sample_time`, None if continuous, and a `latency` [s].
     """
-    from cdpr_drake.study import default_gain
+    from cdpr_drake.analysis import default_gain
 
     if options.gain is not None:
         return options.gain, None
@@ -179,7 +179,7 @@ def _robot_and_test(
     options: Namespace, name: str | None, default_test: int | None
 ) -> tuple[CableRobot, int | None, PaperTest | None]:
     """Return the robot with what it carries, and the test that is meant."""
-    from cdpr_drake.experiments.paper_tests import paper_test, paper_tests
+    from cdpr_drake.runs.paper_tests import paper_test, paper_tests
 
     robot = resolve_robot(name)
     number = options.test

@@ -12,7 +12,7 @@ from cdpr_drake.commands.resolve import pose_values
 from cdpr_drake.commands.terminal import Column, fitting, print_wrapped, table, width_of
 
 if TYPE_CHECKING:
-    from cdpr_drake.experiments import Run, Setup
+    from cdpr_drake.runs import Run, Setup
 
 UNITS = {
     "position_error": "mm",

@@ -25,9 +25,9 @@ from cdpr_drake.commands.results import print_results, summarize
 from cdpr_drake.commands.terminal import Progress, print_message, print_wrapped
 
 if TYPE_CHECKING:
-    from cdpr_drake.experiments import Prepared, Run, Setup
+    from cdpr_drake.analysis import DefaultGain
     from cdpr_drake.model.robot import CableRobot
-    from cdpr_drake.study import DefaultGain
+    from cdpr_drake.runs import Prepared, Run, Setup
 
 DEFAULT_MODELS = ("SCMWE", "SLSM")
 
@@ -85,7 +85,7 @@ def _add_sensing(what: Any) -> None:
 
 def _run(options: Namespace) -> int:
     from cdpr_drake.errors import CdprError
-    from cdpr_drake.experiments import prepare
+    from cdpr_drake.runs import prepare
 
     with input_refused():
         name, setups, chosen = plan(options)
@@ -157,9 +157,9 @@ def plan(options: Namespace) -> Plan:
     Raises:
         CdprError, ValueError: they cannot be used.
     """
-    from cdpr_drake.experiments import Setup
+    from cdpr_drake.analysis import lowest_gain
     from cdpr_drake.model.cable_models import CABLE_MODELS
-    from cdpr_drake.study import lowest_gain
+    from cdpr_drake.runs import Setup
 
     move = resolve_move(options)
     values = _values(options, move)
@@ -215,7 +215,7 @@ def _values(options: Namespace, move: Move) -> dict[str, Any]:
 
 def _at_gain(setup: Setup, chosen: DefaultGain, until: float | None) -> Setup:
     """Return a setup with the gain of all, and the time that it takes unless that was asked for."""
-    from cdpr_drake.experiments.moves import time_for
+    from cdpr_drake.runs.moves import time_for
 
     if chosen.decided_by == "custom":
         return setup
@@ -257,8 +257,8 @@ def describe(name: str, setup: Setup, chosen: DefaultGain | None = None) -> str:
         setup: of one of the runs.
         chosen: why their gain is what it is, if nobody asked for one.
     """
-    from cdpr_drake.experiments.moves import DECAYS, LONGEST
     from cdpr_drake.model.servo import pose_error
+    from cdpr_drake.runs.moves import DECAYS, LONGEST
 
     s = pose_error(setup.start, setup.goal, setup.robot.cameras.X_PM)
     turn, way = math.degrees(math.hypot(*s[:3])), math.hypot(*s[3:])
@@ -286,7 +286,7 @@ def describe(name: str, setup: Setup, chosen: DefaultGain | None = None) -> str:
 
 def _carry_out(ready: Sequence[Prepared]) -> list[Run]:
     """Return the runs, with their progress on stderr."""
-    from cdpr_drake.experiments import run
+    from cdpr_drake.runs import run
 
     label_width = max(len(p.setup.label) for p in ready)
     runs = []

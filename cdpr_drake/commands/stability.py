@@ -13,7 +13,7 @@ from cdpr_drake.commands.resolve import Place, input_refused, resolve_place, res
 from cdpr_drake.commands.terminal import counted, wrapped
 
 if TYPE_CHECKING:
-    from cdpr_drake.study import GainLimit, StabilityMap
+    from cdpr_drake.analysis import GainLimit, StabilityMap
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
@@ -36,7 +36,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _find_limit(options: Namespace) -> int:
-    from cdpr_drake.study import gain_limit, gain_limit_band
+    from cdpr_drake.analysis import gain_limit, gain_limit_band
 
     with input_refused():
         place = resolve_place(options)
@@ -91,7 +91,7 @@ def _map(options: Namespace, place: Place, period: float, law: dict[str, Any]) -
     """Return the map, a latency at a time, with the count of them on stderr."""
     import numpy as np
 
-    from cdpr_drake.study import StabilityMap, stability_map
+    from cdpr_drake.analysis import StabilityMap, stability_map
 
     low, high, count = options.gains
     if low <= 0.0:

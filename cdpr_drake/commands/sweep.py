@@ -20,8 +20,8 @@ from cdpr_drake.commands.terminal import CaseProgress, Column, fitted_table, pri
 if TYPE_CHECKING:
     import numpy as np
 
-    from cdpr_drake.study.default_gain import DefaultGain
-    from cdpr_drake.study.sweep import Sweep
+    from cdpr_drake.analysis.default_gain import DefaultGain
+    from cdpr_drake.batch.sweeps import Sweep
 
 CASES = "cases"
 """Folder in the output's with the results as they arrived."""
@@ -68,10 +68,10 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _sweep(options: Namespace) -> int:
+    from cdpr_drake.batch.monte_carlo import draw
+    from cdpr_drake.batch.sweeps import case_seed
     from cdpr_drake.errors import SweepError
-    from cdpr_drake.experiments import prepare
-    from cdpr_drake.experiments.monte_carlo import draw
-    from cdpr_drake.study.sweep import case_seed
+    from cdpr_drake.runs import prepare
 
     with input_refused():
         base, spread, chosen = _plan(options)
@@ -124,8 +124,8 @@ COMMAND = Command(
 
 def _run_cases(options: Namespace, case: dict[str, Any], progress: CaseProgress) -> Sweep:
     """Return what came of the cases, all alike but for their seeds."""
-    from cdpr_drake.experiments.monte_carlo import run_case
-    from cdpr_drake.study.sweep import sweep
+    from cdpr_drake.batch.monte_carlo import run_case
+    from cdpr_drake.batch.sweeps import sweep
 
     with _executor(options.dask) as executor:
         return sweep(
@@ -143,8 +143,8 @@ def _run_cases(options: Namespace, case: dict[str, Any], progress: CaseProgress)
 
 def _plan(options: Namespace) -> tuple[dict[str, Any], dict[str, Any], DefaultGain | None]:
     """Return what all cases have in common, what is drawn for each, and why their gain is so."""
-    from cdpr_drake.experiments.monte_carlo import base_case, chosen_gain
-    from cdpr_drake.experiments.moves import time_for
+    from cdpr_drake.batch.monte_carlo import base_case, chosen_gain
+    from cdpr_drake.runs.moves import time_for
 
     if not (math.isfinite(options.calibration) and options.calibration >= 0.0):
         raise ValueError(f"--calibration: must be >= 0 and finite, got {options.calibration:g}")
@@ -203,7 +203,7 @@ def _columns(found: Sweep) -> dict[str, np.ndarray]:
     """Return the metrics of the cases that have them, finite ones only."""
     import numpy as np
 
-    from cdpr_drake.experiments.monte_carlo import METRICS
+    from cdpr_drake.batch.monte_carlo import METRICS
 
     columns = {name: found.column(name) for name in METRICS}
     return {name: column[np.isfinite(column)] for name, column in columns.items()}

@@ -59,9 +59,9 @@ def fitted_table(columns: Sequence[Column]) -> str:
 @contextlib.contextmanager
 def warnings_on_one_line() -> Iterator[None]:
     """Print this package's warnings on one line of stderr each, and each only once."""
+    from cdpr_drake.analysis.stability import StabilityWarning
+    from cdpr_drake.analysis.step_size import StepWarning
     from cdpr_drake.model.robot import RobotFileWarning
-    from cdpr_drake.study.stability import StabilityWarning
-    from cdpr_drake.study.step_size import StepWarning
 
     ours = (RobotFileWarning, StabilityWarning, StepWarning)
     seen: set[str] = set()

@@ -90,7 +90,7 @@ def make_vision_based_control(
         robot: the true robot.
         cable_model: the control law's "ECM", "CMWE", "SCMWE" or "SLSM".
         gain: lambda [1/s]; if None, the robot's own where its file names one, else 0.1. Whether
-            that is below the limit at a goal, `study.default_gain` knows.
+            that is below the limit at a goal, `analysis.default_gain` knows.
         sample_time: period T of the vision loop [s]; None for an all-continuous loop.
         latency: from image to change of the motor rates [s]; without effect if all is continuous.
         calibrated: the robot as the controller believes it; the true one if None.

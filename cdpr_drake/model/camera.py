@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 
 from cdpr_drake.model.robot import CableRobot
-from cdpr_drake.model.rotations import Array
+from cdpr_drake.model.rotations import Array, as_pose
 
 
 class MeasuredPose:
@@ -48,3 +49,20 @@ class MeasuredPose:
 
 def _stacked(X: RigidTransform) -> Array:
     return np.vstack([X.rotation().matrix(), X.translation()])
+
+
+def true_from_seen(
+    robot: CableRobot, believed: CableRobot, seen: RigidTransform | ArrayLike
+) -> RigidTransform:
+    """Return X_WP when the controller measures the platform at the pose `seen`.
+
+    Args:
+        robot: the true robot.
+        believed: the robot as the controller knows it.
+        seen: the measured X_WP, or [roll, pitch, yaw, x, y, z] (rad, m).
+    """
+    true, ours = robot.cameras, believed.cameras
+    if true.X_WF == ours.X_WF and true.X_PM == ours.X_PM:
+        return as_pose(seen)
+    X_FM = ours.X_WF.InvertAndCompose(as_pose(seen) @ ours.X_PM)
+    return true.X_WF @ X_FM @ true.X_PM.inverse()

@@ -241,7 +241,7 @@ class CableRobot(Record):
         cameras: the cameras.
         load_cells: the load cells.
         gain: lambda [1/s] of its control law where nobody asks for another; if None, what
-            `study.default_gain` finds.
+            `analysis.default_gain` finds.
         sources: where the values come from, by field (`cable.section`) or group (`cable`).
         assumptions: what is assumed rather than known.
 

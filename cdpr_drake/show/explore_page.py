@@ -13,8 +13,8 @@ from functools import partial
 from http.client import HTTPConnection
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
+from cdpr_drake.analysis.explore import Answers, Snapshot
 from cdpr_drake.show.cables import css, tension_colours
-from cdpr_drake.study.explore import Answers, Snapshot
 
 HOST = "127.0.0.1"
 """The only address served: that of this machine to itself."""

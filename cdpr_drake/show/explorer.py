@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike
 from pydrake.geometry import Cylinder, Meshcat, MeshcatParams, Rgba
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analysis.explore import Snapshot, explore_pose
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, pose_to_vector
 from cdpr_drake.show import scene
 from cdpr_drake.show.cables import CABLE_RADIUS, SEGMENTS, cable_shapes, linear, tension_colours
 from cdpr_drake.show.explore_page import HOST, PageServer, panel_html
-from cdpr_drake.study.explore import Snapshot, explore_pose
 
 POSE = ("roll [deg]", "pitch [deg]", "yaw [deg]", "x [m]", "y [m]", "z [m]")
 """Names of the sliders of the pose, in the order of a pose vector."""

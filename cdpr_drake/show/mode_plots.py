@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform, RotationMatrix
 
+from cdpr_drake.analysis.stability import StabilityMap
 from cdpr_drake.model.kinematics import cable_ends
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, pose_to_vector
@@ -21,7 +22,6 @@ from cdpr_drake.show.plots import _figure, _legend_below, spread
 from cdpr_drake.show.style import REFERENCE, RUN_COLOURS, cable_colour
 from cdpr_drake.study.modes import Mode, Modes
 from cdpr_drake.study.names import ERROR, POSE
-from cdpr_drake.study.stability import StabilityMap
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cdpr_drake.experiments.ablation import Ablation, Statistic
-from cdpr_drake.experiments.calibration_study import CalibrationEffect
+from cdpr_drake.analysis.calibration_study import CalibrationEffect
+from cdpr_drake.batch.ablation import Ablation, Statistic
 from cdpr_drake.show.plots import _figure
 from cdpr_drake.show.style import REFERENCE, RUN_COLOURS
 

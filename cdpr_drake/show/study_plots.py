@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cdpr_drake.analysis.compare import Comparison, ModelComparison
+from cdpr_drake.analysis.gain_matrix import GainMap
 from cdpr_drake.model.cable_models import CABLE_MODELS
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.show.plots import _dress, _figure, _legend_below
 from cdpr_drake.show.style import REFERENCE, run_styles
-from cdpr_drake.study.compare import Comparison, ModelComparison
-from cdpr_drake.study.gain_matrix import GainMap
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

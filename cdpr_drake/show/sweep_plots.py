@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cdpr_drake.batch.sweeps import Sweep
 from cdpr_drake.show.plots import _dress, _figure
 from cdpr_drake.show.style import REFERENCE, RUN_COLOURS
-from cdpr_drake.study.sweep import Sweep
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,7 +31,7 @@ def sweep_figure(found: Sweep) -> Figure:
     shows the share of cases up to a value, with the median and the middle 90 % marked.
 
     Args:
-        found: of `experiments.monte_carlo.run_case`.
+        found: of `batch.monte_carlo.run_case`.
 
     Raises:
         ValueError: no case succeeded.

@@ -14,6 +14,7 @@ from pydrake.systems.primitives import RandomSource
 
 from cdpr_drake.diagrams import rest_context, robot_of
 from cdpr_drake.errors import EquilibriumError, GeometryError, TensionError
+from cdpr_drake.model.camera import true_from_seen
 from cdpr_drake.model.equilibrium import gravity_wrench
 from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.robot import CableRobot
@@ -115,23 +116,6 @@ def true_pose(loop: Any, seen: RigidTransform | ArrayLike) -> RigidTransform:
         if path[-1] == "camera" and hasattr(system, "calibrated"):
             return true_from_seen(system.robot, system.calibrated, seen)
     return as_pose(seen)
-
-
-def true_from_seen(
-    robot: CableRobot, believed: CableRobot, seen: RigidTransform | ArrayLike
-) -> RigidTransform:
-    """Return X_WP when the controller measures the platform at the pose `seen`.
-
-    Args:
-        robot: the true robot.
-        believed: the robot as the controller knows it.
-        seen: the measured X_WP, or [roll, pitch, yaw, x, y, z] (rad, m).
-    """
-    true, ours = robot.cameras, believed.cameras
-    if true.X_WF == ours.X_WF and true.X_PM == ours.X_PM:
-        return as_pose(seen)
-    X_FM = ours.X_WF.InvertAndCompose(as_pose(seen) @ ours.X_PM)
-    return true.X_WF @ X_FM @ true.X_PM.inverse()
 
 
 @dataclass(frozen=True, kw_only=True)

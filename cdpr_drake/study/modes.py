@@ -15,12 +15,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydrake.math import RigidTransform
 
-from cdpr_drake.model.equilibrium import rest_state
-from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.study.names import ERROR, POSE, TWIST
-from cdpr_drake.study.platform import RestModel, rest_model
 from cdpr_drake.study.sampled import OnePeriodMap
 from cdpr_drake.study.state_space import Array, StateSpace
 
@@ -191,65 +187,26 @@ def modes(model: StateSpace | OnePeriodMap | ArrayLike) -> Modes:
         ValueError: the matrix is not square, or not finite.
     """
     if isinstance(model, OnePeriodMap):
-        return _modes(model.matrix, model.states, model.period)
+        return modes_of(model.matrix, model.states, model.period)
     if isinstance(model, StateSpace):
-        return _modes(model.A, model.states, None)
+        return modes_of(model.A, model.states)
     A = np.asarray(model, float)
     if A.ndim != 2 or A.shape[0] != A.shape[1]:
         raise ValueError(f"modes need a square matrix, got {A.shape}")
-    return _modes(A, tuple(f"x[{i + 1}]" for i in range(len(A))), None)
+    return modes_of(A, tuple(f"x[{i + 1}]" for i in range(len(A))))
 
 
-def platform_modes(
-    robot: CableRobot,
-    pose: RigidTransform | ArrayLike,
-    winches: str = "locked",
-    *,
-    tensions: str = "minimum norm",
-) -> Modes:
-    """Return the modes of the platform on its cables at a rest.
-
-    M dv/dt = K x + C v with the exact catenaries' stiffness K and damping C. With the winches under
-    control their own modes are there too.
+def modes_of(A: Array, states: tuple[str, ...], period: float | None = None) -> Modes:
+    """Return the modes of a matrix whose states have names.
 
     Args:
-        robot: the robot, with its payload.
-        pose: X_WP, or [roll, pitch, yaw, x, y, z] (rad, m).
-        winches: "locked", or "controlled" by their PID at constant desired angles.
-        tensions: "minimum norm" (of the chord tensions), or "within limits".
+        A: (n, n) of dx/dt = A x, or of one period's z[n + 1] = A z[n].
+        states: n names.
+        period: T [s] of a sampled system.
 
     Raises:
-        GeometryError, TensionError, EquilibriumError: the robot cannot rest there.
-        ValueError: winches neither locked nor controlled; an unknown rule.
+        ValueError: the matrix is not finite.
     """
-    return rest_modes(rest_model(robot, rest_state(robot, pose, tensions)), winches)
-
-
-def rest_modes(model: RestModel, winches: str = "locked") -> Modes:
-    """Return the modes of the platform on its cables about a rest; see `platform_modes`.
-
-    Args:
-        model: the robot's linear model there.
-        winches: "locked" or "controlled".
-
-    Raises:
-        ValueError: winches neither locked nor controlled.
-    """
-    if winches not in ("locked", "controlled"):
-        raise ValueError(f'winches are "locked" or "controlled", not "{winches}"')
-    names = tuple(f"platform/{part}" for part in ERROR + TWIST)
-    if winches == "locked":
-        return _modes(model.locked(), names, None)
-    groups = ("angle", "rate", "integral")
-    numbers = range(1, model.robot.num_cables + 1)
-    return _modes(
-        model.controlled()[0],
-        names + tuple(f"winches/{group}[{i}]" for group in groups for i in numbers),
-        None,
-    )
-
-
-def _modes(A: Array, states: tuple[str, ...], period: float | None) -> Modes:
     if not np.all(np.isfinite(A)):
         raise ValueError("modes need a matrix of finite numbers")
     values, shapes, shares = _eigen(A)

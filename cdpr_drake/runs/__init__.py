@@ -1,0 +1,17 @@
+"""The paper's tests as data, and runs of them."""
+
+from cdpr_drake.runs.metrics import Summary
+from cdpr_drake.runs.paper_tests import PaperTest, paper_test
+from cdpr_drake.runs.running import Prepared, Run, Setup, prepare, run, setup_of_test
+
+__all__ = [
+    "PaperTest",
+    "Prepared",
+    "Run",
+    "Setup",
+    "Summary",
+    "paper_test",
+    "prepare",
+    "run",
+    "setup_of_test",
+]
