@@ -9,7 +9,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram
 
 from benchmarks.solve_ivp_loop import Loop, Noise, Start
-from cdpr_drake.diagrams import leaf_systems
+from cdpr_drake.diagrams import blocks
 from cdpr_drake.model.equilibrium import rest_state
 from cdpr_drake.runs.running import Setup
 
@@ -39,7 +39,7 @@ def numbers_of(setup: Setup) -> tuple[Loop, Start]:
 def noise_of(diagram: Diagram, context: Context, until: float, sample_time: float) -> Noise:
     """Return the noise that the sources of a loop will give from a context on, unchanged by it."""
     frames = round(until / sample_time) + 1
-    sources = {path[-1]: s for path, s in leaf_systems(diagram) if path[-1].endswith("_noise")}
+    sources = {path[-1]: s for path, s in blocks(diagram) if path[-1].endswith("_noise")}
     samples = {
         name.removesuffix("_noise"): _samples(source, context, frames, sample_time)
         for name, source in sources.items()

@@ -535,7 +535,7 @@ def test_at_rest_the_tangents_held_are_those_seen_without_noise() -> None:
     robot, u, _, _ = scene()
     system = StereoImageCameras(robot)
     context = fixed_context(system, stereo_inputs() | {"noise": np.array([1.0])})
-    system.set_at_rest(context)
+    system.settle(context)
     got = outputs(system, context)
     assert got["valid_tangents"].all() and not got["frames_lost"].any()
     assert angles(got["measured_tangents"].reshape(-1, 3), u).max() < 1e-4

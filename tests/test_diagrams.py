@@ -85,7 +85,7 @@ def unrest(diagram: Diagram, context: Context) -> float:
     worst = 0.0
     robot = robot_of(diagram)
     derivatives = diagram.EvalTimeDerivatives(context)
-    for path, system in diagrams.leaf_systems(diagram):
+    for path, system in diagrams.blocks(diagram):
         size = system.GetMyContextFromRoot(context).num_continuous_states()
         if not size:
             continue
@@ -387,7 +387,7 @@ def test_an_external_wrench_counts_like_a_payload(cogiro: CableRobot) -> None:
         diagram = LOOPS[loop](cogiro)
         context = rest_context(diagram, X_REST)
         set_at_rest(diagram, context, rest)
-        platform = next(s for p, s in diagrams.leaf_systems(diagram) if p[-1] == "platform")
+        platform = next(s for p, s in diagrams.blocks(diagram) if p[-1] == "platform")
         acceleration = diagram_derivatives(platform, context)[6:]
         assert np.abs(acceleration).max() > 1.0
         diagram.GetInputPort("external_wrench").FixValue(context, wrench)

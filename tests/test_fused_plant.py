@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from cdpr_drake.diagrams import (
-    leaf_systems,
+    blocks,
     make_vision_based_control,
     rest_context,
     robot_of,
     simulate,
 )
-from cdpr_drake.errors import CableError, LinearizationError, SimulationError
+from cdpr_drake.errors import CableError, SimulationError
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.vision.outages import Outage
-from cdpr_drake.study import linearize
+from cdpr_drake.study import equilibrium, linearize
 from cdpr_drake.systems import FusedPlant
 
 POSE = [0.05, -0.1, 0.2, -1.0, 0.4, 1.3]
@@ -60,7 +60,7 @@ def states(loop: Any, context: Any) -> np.ndarray:
 
 def leaves(loop: Any) -> list[tuple[str, Any]]:
     """Return (name, system) of all systems in a loop."""
-    return [(path[-1], system) for path, system in leaf_systems(loop)]
+    return [(path[-1], system) for path, system in blocks(loop)]
 
 
 def spread(loop: Any, context: Any, y: np.ndarray) -> None:
@@ -153,8 +153,17 @@ def test_what_cannot_be_fused_is_said(cogiro: CableRobot) -> None:
     with pytest.raises(ValueError, match="fail"):
         make_vision_based_control(cogiro, outages=(dead,), fused=True)
     loop = make_vision_based_control(cogiro, sample_time=None, fused=True)
-    with pytest.raises(LinearizationError, match="robot"):
-        linearize(loop, rest_context(loop, POSE), ["desired_pose"], ["pose"])
+    context = equilibrium(loop, POSE)
+    model = linearize(loop, context, ["desired_pose"], ["pose"], require_equilibrium=False)
+    assert model.by_differences == ("robot",)
+    blocks = make_vision_based_control(cogiro, sample_time=None)
+    exact = linearize(blocks, equilibrium(blocks, POSE), ["desired_pose"], ["pose"])
+    assert exact.by_differences == ()
+    slow, exact_slow = (m.eigenvalues[np.argsort(abs(m.eigenvalues))][2:8] for m in (model, exact))
+    np.testing.assert_allclose(np.sort(slow.real), np.sort(exact_slow.real), rtol=1e-6)
+    s = 2j * np.pi * 0.05
+    responses = [m.C @ np.linalg.solve(s * np.eye(len(m.A)) - m.A, m.B) for m in (model, exact)]
+    np.testing.assert_allclose(responses[0], responses[1], atol=1e-7)
 
 
 def test_a_torn_cable_and_a_nan_are_named(cogiro: CableRobot) -> None:

@@ -297,12 +297,12 @@ def test_images_that_cannot_be_are_refused(cogiro: CableRobot) -> None:
     black = np.zeros_like(cast(0)[0])
     show(system, context, [black] * 3)
     with pytest.raises(GeometryError, match="no pose camera sees a whole pattern"):
-        system.set_at_rest(context)
+        system.settle(context)
     with pytest.raises(SimulationError, match="measured pose at t = 0 s: no pose camera sees"):
         Simulator(system, context).AdvanceTo(0.01)
     system.GetInputPort("image_2").FixValue(context, as_image(black[:512, :640]))
     with pytest.raises(GeometryError, match=r"image 2 is of 640 x 512 pixels.* 1280 x 1024"):
-        system.set_at_rest(context)
+        system.settle(context)
 
 
 # --- the lens

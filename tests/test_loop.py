@@ -11,7 +11,7 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder, LeafSyst
 from pydrake.systems.primitives import Integrator
 
 from cdpr_drake.diagrams import (
-    leaf_systems,
+    blocks,
     make_joint_space_control,
     make_vision_based_control,
     rest_context,
@@ -175,7 +175,7 @@ def stretch_gradient(
 
 def energy(robot: CableRobot, diagram: Diagram, context: Context) -> dict[str, float]:
     """Return the energies [J] of a robot in a context of a diagram around it."""
-    systems = {path[-1]: system for path, system in leaf_systems(diagram)}
+    systems = {path[-1]: system for path, system in blocks(diagram)}
     plant = systems["platform"]
     own = plant.GetMyContextFromRoot(context)
     winches = systems["winches"].GetMyContextFromRoot(context)

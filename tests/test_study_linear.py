@@ -25,7 +25,7 @@ from pydrake.systems.primitives import (
 from study_samples import POSE, central_differences
 
 from cdpr_drake.diagrams import (
-    leaf_systems,
+    blocks,
     make_cable_robot,
     make_joint_space_control,
     make_vision_based_control,
@@ -149,7 +149,7 @@ def test_each_state_has_the_name_of_its_place(cogiro: CableRobot) -> None:
     context = diagram.CreateDefaultContext()
     names = continuous_state_names(diagram)
     assert len(set(names)) == len(names) == 52
-    systems = dict(leaf_systems(diagram))
+    systems = dict(blocks(diagram))
 
     def at(*path: str) -> Any:
         return systems[path].GetMyMutableContextFromRoot(context)
@@ -173,7 +173,7 @@ def test_each_state_has_the_name_of_its_place(cogiro: CableRobot) -> None:
 def test_each_discrete_state_has_the_name_of_its_place(cogiro: CableRobot) -> None:
     diagram = make_vision_based_control(cogiro, latency=0.12)
     context = rest_context(diagram, POSE)
-    systems = dict(leaf_systems(diagram))
+    systems = dict(blocks(diagram))
     delay = systems[("sampled_pose",)]
     own = delay.GetMyMutableContextFromRoot(context)
     # Update with marked poses: what came last is not 1 or 2 frames ago.
@@ -293,13 +293,41 @@ class Abstract(LeafSystem):
     [
         ZeroOrderHold(0.1, 2),
         Abstract(),
-        Tank(),
         LinearSystem(np.eye(2), np.eye(2), np.eye(2), np.eye(2), 0.1),
     ],
 )
 def test_a_block_in_the_way_is_named(system: Any) -> None:
     with pytest.raises(LinearizationError, match='block "culprit"'):
         linearize(*(lambda d: (d, d.CreateDefaultContext()))(linear_diagram(("culprit", system))))
+
+
+def test_a_block_without_autodiff_is_linearised_by_differences_and_named() -> None:
+    diagram = linear_diagram(("tank", Tank()), ("pump", Pump()))
+    context = diagram.CreateDefaultContext()
+    diagram.GetInputPort("u").FixValue(context, [1.0, 2.0])
+    context.SetContinuousState([0.0, 0.0, 0.3, 0.0, 2.0])
+    model = linearize(diagram, context, require_equilibrium=False)
+    assert model.by_differences == ("tank", "pump")
+    assert model.states[2:] == ("tank/level", "tank/heat", "pump/x[1]")
+    np.testing.assert_allclose(model.A[4, 4], -3.0 * 2.0**2, rtol=1e-12)
+    np.testing.assert_allclose(model.B[:2], np.eye(2), atol=1e-12)
+    np.testing.assert_allclose(model.C[-1], [0.0, 0.0, 0.0, 0.0, np.cos(2.0)], atol=1e-10)
+    assert np.count_nonzero(model.A) == 1
+
+
+class Pump(LeafSystem):
+    """A nonlinear system without AutoDiffXd: dx/dt = 8 - x^3, y = sin x."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.DeclareContinuousState(1)
+        self.DeclareVectorOutputPort("y", 1, self._calc)
+
+    def DoCalcTimeDerivatives(self, context: Any, derivatives: Any) -> None:
+        derivatives.SetFromVector(8.0 - context.get_continuous_state_vector().CopyToVector() ** 3)
+
+    def _calc(self, context: Any, output: Any) -> None:
+        output.SetFromVector(np.sin(context.get_continuous_state_vector().CopyToVector()))
 
 
 def test_noise_and_sampling_are_named(cogiro: CableRobot) -> None:

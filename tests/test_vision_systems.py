@@ -167,7 +167,7 @@ def test_a_platform_never_seen_ends_the_run(cogiro: CableRobot) -> None:
     above = POSE + np.eye(6)[5] * 9.0
     context = fixed_context(system, {"pose": above})
     with pytest.raises(GeometryError, match="no pose camera sees a whole pattern"):
-        system.set_at_rest(context)
+        system.settle(context)
 
 
 def test_numbers_that_are_not_finite_are_refused(cogiro: CableRobot) -> None:

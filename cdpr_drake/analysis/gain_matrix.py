@@ -26,7 +26,7 @@ from cdpr_drake.model.rest_model import RestModel, rest_model
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, pose_to_vector
 from cdpr_drake.model.servo import MotorRateLaw, ServoSettings
-from cdpr_drake.study.names import TWIST
+from cdpr_drake.model.signals import TWIST
 from cdpr_drake.study.response import excursion, free_response
 from cdpr_drake.study.state_space import Array
 

@@ -8,8 +8,8 @@ from pydrake.math import RigidTransform
 from cdpr_drake.model.equilibrium import rest_state
 from cdpr_drake.model.rest_model import RestModel, rest_model
 from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.signals import ERROR, TWIST
 from cdpr_drake.study.modes import Modes, modes_of
-from cdpr_drake.study.names import ERROR, TWIST
 
 
 def platform_modes(

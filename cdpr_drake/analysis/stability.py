@@ -24,8 +24,8 @@ from cdpr_drake.diagrams.control import check_sampling, split_latency
 from cdpr_drake.model.camera import true_from_seen
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.servo import ServoSettings
+from cdpr_drake.model.signals import ERROR, TWIST
 from cdpr_drake.study.modes import Mode, Modes, modes
-from cdpr_drake.study.names import ERROR, TWIST
 from cdpr_drake.study.sampled import OnePeriodMap, one_period_map
 from cdpr_drake.study.state_space import Array
 

@@ -1,26 +1,26 @@
-"""Contexts in which a whole diagram is at rest."""
+"""Contexts in which a whole diagram is at rest: each system puts itself there.
+
+What a system answers for it is in `systems.answers`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydrake.common import RandomGenerator
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, Diagram, InputPort, System
-from pydrake.systems.primitives import DiscreteTimeDelay, ZeroOrderHold
+from pydrake.systems.framework import Context, Diagram
 
+from cdpr_drake.diagrams.blocks import Block, blocks, fed_ports
+from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.model.equilibrium import RestState, forward_kinematics, rest_state
-from cdpr_drake.model.inverse_kinematics import InverseKinematics, motor_angles
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, as_pose, pose_to_vector
-from cdpr_drake.model.winch import WinchModel
-from cdpr_drake.systems.fused_plant import FusedPlant
-from cdpr_drake.systems.held_pose import HeldPose
-from cdpr_drake.systems.load_cell import LoadCellFilter
-from cdpr_drake.systems.plausible_tension import PlausibleTension
-from cdpr_drake.systems.stereo import StereoCameras
+
+TOLERANCE = 1e-9
+"""Rate of change of a state at rest, relative to the largest term of its equation."""
 
 
 def rest_context(
@@ -31,12 +31,14 @@ def rest_context(
 ) -> Context:
     """Return a context in which plant, winches, filters, samples and latency buffers are at rest.
 
-    The robot rests at the pose, whatever the goal; an open input "desired_pose" is fixed at the
-    pose, to be fixed at a goal by the caller. In a joint space loop the pose is what the controller
-    asks for: lengths follow from its inverse kinematics, the true pose and tensions from them.
+    The robot rests at the pose, whatever the goal; an open input that feeds a port "desired_pose"
+    is fixed at the pose, to be fixed at a goal by the caller. In a joint space loop the pose is
+    what the controller asks for: lengths follow from its inverse kinematics, the true pose and
+    tensions from them. Whatever else pulls at the platform there, a spring say, is borne too.
 
     Args:
-        diagram: a diagram of this package, or one built around it.
+        diagram: any diagram with a system that has cables (`CatenaryCableForce` or `FusedPlant`),
+            whatever its blocks are called.
         pose: X_WP, or [roll, pitch, yaw, x, y, z] (rad, m).
         tensions: "minimum norm" (of the chord tensions), or "within limits"; without effect in a
             joint space loop.
@@ -44,21 +46,34 @@ def rest_context(
             one context to the next.
 
     Raises:
-        GeometryError, TensionError, EquilibriumError: the robot cannot rest there.
+        GeometryError, TensionError, EquilibriumError: the robot cannot rest there, or a block has
+            state that does not rest; names it.
+        ValueError: the diagram has no cables.
     """
     context = diagram.CreateDefaultContext()
     if seed is not None:
         diagram.SetRandomContext(context, RandomGenerator(seed))
-    target = pose_to_vector(as_pose(pose))
-    for index in range(diagram.num_input_ports()):
-        port = diagram.get_input_port(index)
-        if port.get_name() == "desired_pose":
-            port.FixValue(context, target)
-        elif port.get_name() == "desired_motor_angles":
-            port.FixValue(context, np.zeros(port.size()))
-    systems = {path: system for path, system in leaf_systems(diagram)}
-    rest = _rest(systems, as_pose(pose), tensions)
-    set_at_rest(diagram, context, rest)
+    X_WP = as_pose(pose)
+    robot = robot_of(diagram)
+    fix_inputs(diagram, context, {"desired_pose"}, pose_to_vector(X_WP))
+    inside = list(blocks(diagram))
+    rest = _rest_of_weight(inside, robot, X_WP, tensions, None)
+    wrench, scale = np.zeros(6), robot.mass * robot.gravity
+    for _ in range(50):
+        _place(diagram, inside, context, rest)
+        unbalanced = _unbalanced(inside, context)
+        if np.max(np.abs(unbalanced)) <= TOLERANCE * max(scale, np.max(np.abs(wrench))):
+            break
+        wrench = wrench + unbalanced
+        rest = _rest_of_weight(inside, robot, X_WP, tensions, wrench)
+    else:
+        raise EquilibriumError(
+            "no rest found: what else pulls at the platform changes with the pose more than the "
+            f"cables' pull does; the last imbalance is {np.array2string(unbalanced, precision=3)}"
+        )
+    _settle(inside, context)
+    for block in inside:
+        _check(block, context)
     return context
 
 
@@ -66,100 +81,165 @@ def set_at_rest(diagram: Diagram, context: Context, rest: RestState) -> None:
     """Put every system of a diagram at rest in a state of the robot.
 
     Args:
-        diagram: a diagram of this package, or one built around it.
+        diagram: any diagram with cables.
         context: its context, changed.
         rest: the state.
+
+    Raises:
+        EquilibriumError: samples and memories do not come to rest.
     """
-    systems = dict(leaf_systems(diagram))
-    robot = robot_of(diagram)
-    tension = rest.tension_at_drawing_point
-    platform = np.concatenate([pose_to_vector(rest.X_WP), np.zeros(6)])
-    angles = motor_angles(robot, rest.unstrained_length)
-    winches, desired = WinchModel(robot).at_rest(angles, tension)
-    for path, system in systems.items():
-        own = system.GetMyMutableContextFromRoot(context)
-        name = path[-1]
-        if name == "platform":
-            system.SetPositionsAndVelocities(own, platform)
-        elif name == "winches":
-            own.SetContinuousState(winches)
-        elif name == "load_cells":
-            own.SetContinuousState(_filters_at_rest(system, tension))
-        elif name == "integrator":
-            own.SetContinuousState(desired)
-        elif isinstance(system, FusedPlant):
-            filters = _filters_at_rest(system, tension)
-            own.SetContinuousState(np.concatenate([platform, winches, filters, desired]))
-        elif name == "held_rates":
-            own.SetDiscreteState(np.zeros(system.get_output_port().size()))
-    port = _input_port(diagram, "desired_motor_angles")
-    if port is not None:
-        port.FixValue(context, desired)
-    _fill_samplers(systems, context)
-
-
-def _filters_at_rest(system: LoadCellFilter | FusedPlant, tension: Array) -> Array:
-    """Return the state of a system's load cells under tensions (k,) [N] that do not change."""
-    return np.tile(system.reading(tension), system.robot.load_cells.order)
-
-
-def _fill_samplers(systems: dict[tuple[str, ...], System], context: Context) -> None:
-    """Fill holds and delay lines with what their input is now, cameras with what they see."""
-    for path, system in systems.items():
-        if isinstance(system, HeldPose | StereoCameras):
-            system.set_at_rest(system.GetMyMutableContextFromRoot(context))
-        if path[-1].startswith("sampled_") and isinstance(
-            system, ZeroOrderHold | DiscreteTimeDelay
-        ):
-            own = system.GetMyMutableContextFromRoot(context)
-            value = system.get_input_port().Eval(own)
-            size = own.get_discrete_state_vector().size()
-            own.SetDiscreteState(np.tile(value, size // value.size))
-    for system in systems.values():
-        if isinstance(system, PlausibleTension):  # whose inputs are samples
-            system.set_at_rest(system.GetMyMutableContextFromRoot(context))
-
-
-def leaf_systems(diagram: Diagram) -> Iterator[tuple[tuple[str, ...], System]]:
-    """Yield (path of names, system) for every system inside a diagram that is not a diagram.
-
-    Args:
-        diagram: the diagram.
-    """
-    for system in diagram.GetSystems():
-        if isinstance(system, Diagram):
-            for path, leaf in leaf_systems(system):
-                yield (system.get_name(), *path), leaf
-        else:
-            yield (system.get_name(),), system
+    inside = list(blocks(diagram))
+    _place(diagram, inside, context, rest)
+    _settle(inside, context)
 
 
 def robot_of(diagram: Diagram) -> CableRobot:
-    """Return the true robot of a diagram of this package.
+    """Return the true robot of a diagram.
 
     Args:
         diagram: the diagram.
 
     Raises:
-        ValueError: it has no block "cables".
+        ValueError: it has no cables.
     """
-    for path, system in leaf_systems(diagram):
-        if path[-1] == "cables" or isinstance(system, FusedPlant):
-            return system.robot
-    raise ValueError(f'diagram "{diagram.get_name()}" has no block "cables", so no cable robot')
+    robot: CableRobot = cables_of(diagram).system.cable_robot
+    return robot
 
 
-def _rest(systems: dict[tuple[str, ...], System], X_WP: RigidTransform, tensions: str) -> RestState:
-    robot = next(
-        s.robot for path, s in systems.items() if path[-1] == "cables" or isinstance(s, FusedPlant)
+def cables_of(diagram: Diagram) -> Block:
+    """Return the block of a diagram that has the cables, and a port "tension_at_drawing_point".
+
+    Args:
+        diagram: the diagram.
+
+    Raises:
+        ValueError: there is none.
+    """
+    for block in blocks(diagram):
+        if block.answer("cable_robot") is not None:
+            return block
+    raise ValueError(
+        f'diagram "{diagram.get_name()}" has no cables: no CatenaryCableForce, no FusedPlant, and '
+        'no other block with an attribute "cable_robot"'
     )
-    for path, system in systems.items():
-        if path[-1] == "inverse_kinematics":
-            angles = InverseKinematics(system.robot, system.cable_model).motor_angles(X_WP)
-            lengths = robot.winch.encoder_zero_length + robot.winch.transmission * angles
-            return forward_kinematics(robot, lengths, X_WP)
-    return rest_state(robot, X_WP, tensions)
 
 
-def _input_port(diagram: Diagram, name: str) -> InputPort | None:
-    return diagram.GetInputPort(name) if diagram.HasInputPort(name) else None
+def fix_inputs(diagram: Diagram, context: Context, ports: set[str], value: Array) -> None:
+    """Fix the inputs of a diagram that feed ports of given names.
+
+    Args:
+        diagram: the diagram.
+        context: its context, changed.
+        ports: names of ports of blocks.
+        value: for each input.
+    """
+    for name, _, fed in fed_ports(diagram):
+        if fed in ports:
+            diagram.GetInputPort(name).FixValue(context, value)
+
+
+def _rest_of_weight(
+    inside: Sequence[Block],
+    robot: CableRobot,
+    X_WP: RigidTransform,
+    tensions: str,
+    wrench: Array | None,
+) -> RestState:
+    """Return the robot's rest under its weight and a wrench: where lengths, or the pose, say."""
+    for block in inside:
+        asked_for = block.answer("motor_angles_at")
+        if asked_for is not None:
+            winch = robot.winch
+            lengths = winch.encoder_zero_length + winch.transmission * asked_for(X_WP)
+            return forward_kinematics(robot, lengths, X_WP, wrench=wrench)
+    return rest_state(robot, X_WP, tensions, wrench)
+
+
+def _place(diagram: Diagram, inside: Sequence[Block], context: Context, rest: RestState) -> None:
+    """Have each system put itself at rest that can without a look at its inputs."""
+    for block in inside:
+        put = block.answer("set_at_rest")
+        if put is not None:
+            put(block.context(context), rest)
+    angles = {"desired_motor_angle", "desired_motor_angles"}
+    fix_inputs(diagram, context, angles, rest.desired_motor_angles)
+
+
+def _unbalanced(inside: Sequence[Block], context: Context) -> Array:
+    for block in inside:
+        wrench = block.answer("unbalanced_wrench")
+        if wrench is not None:
+            unbalanced: Array = wrench(block.context(context))
+            return unbalanced
+    return np.zeros(6)
+
+
+def _settle(inside: Sequence[Block], context: Context) -> None:
+    """Have samples and memories take what their inputs are, until nothing changes any more.
+
+    One may need another's first, wherever that stands in the order of the blocks: what it raises
+    before then counts only if it stays.
+    """
+    settling = [(block, put) for block in inside if (put := block.answer("settle")) is not None]
+    for _ in range(len(settling) + 2):
+        failed: tuple[Block, Exception] | None = None
+        changed = False
+        for block, settle in settling:
+            own = block.context(context)
+            before = _state(block, own)
+            try:
+                settle(own)
+            except Exception as error:
+                failed = failed or (block, error)
+            changed = changed or not np.array_equal(before, _state(block, own), equal_nan=True)
+        if not changed:
+            break
+    else:
+        raise EquilibriumError("samples and memories of the diagram do not come to rest")
+    if failed is not None:
+        raise failed[1]
+
+
+def _state(block: Block, own: Context) -> Array:
+    parts = [own.get_continuous_state_vector().CopyToVector()]
+    discrete = own.get_discrete_state()
+    parts += [discrete.get_vector(i).CopyToVector() for i in range(discrete.num_groups())]
+    return np.concatenate(parts)
+
+
+def _check(block: Block, context: Context) -> None:
+    """Raise EquilibriumError where a block says it does not rest, or says nothing and moves."""
+    asked = block.answer("not_at_rest")
+    if asked is not None:
+        if reason := asked(block.context(context)):
+            raise EquilibriumError(f"{block} does not rest: {reason}")
+    elif block.answer("set_at_rest") is None and block.answer("settle") is None:
+        _check_unanswered(block, context)
+
+
+def _check_unanswered(block: Block, context: Context) -> None:
+    """Raise EquilibriumError where a block does not say how it rests, and its state changes."""
+    system, own = block.system, block.context(context)
+    before = _state(block, own)
+    if not before.size:
+        return
+    n = system.num_continuous_states()
+    change = [system.EvalTimeDerivatives(own).CopyToVector()] if n else []
+    if system.num_discrete_state_groups():
+        if system.GetUniquePeriodicDiscreteUpdateAttribute() is None:
+            raise EquilibriumError(f"whether {block} rests is not known: {_ADVICE}")
+        after = system.EvalUniquePeriodicDiscreteUpdate(own)
+        values = [after.get_vector(i).CopyToVector() for i in range(after.num_groups())]
+        change.append(np.concatenate(values) - before[n:])
+    moves = np.abs(np.concatenate(change)) / np.maximum(1.0, np.abs(before))
+    if not np.max(moves) <= TOLERANCE:
+        raise EquilibriumError(
+            f"{block} does not rest: its state {int(np.argmax(moves)) + 1} changes by "
+            f"{np.concatenate(change)[np.argmax(moves)]:.3g}; {_ADVICE}"
+        )
+
+
+_ADVICE = (
+    "its class has to implement set_at_rest(context, rest), from how the robot rests, or "
+    "settle(context), from what its inputs are (see cdpr_drake.systems.answers)"
+)

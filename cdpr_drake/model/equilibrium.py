@@ -11,10 +11,12 @@ from pydrake.math import RigidTransform, RotationMatrix
 from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.model.arrays import RobotArrays
 from cdpr_drake.model.cables import CableSet, pose_arrays
+from cdpr_drake.model.inverse_kinematics import motor_angles
 from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.robot import CableRobot
-from cdpr_drake.model.rotations import Array, as_pose
+from cdpr_drake.model.rotations import Array, as_pose, exp_rotation
 from cdpr_drake.model.statics import check_rank, distribute, wrench_at, wrench_matrix
+from cdpr_drake.model.winch import WinchModel
 
 TOLERANCE = 1e-11
 """Residual wrench relative to the weight (torques per metre of the platform) at an equilibrium."""
@@ -30,6 +32,8 @@ class RestState:
         chord_tension: (k,) [N] horizontal tension over cos(beta0).
         tension_at_drawing_point: (k,) [N].
         tension_at_attachment_point: (k,) [N].
+        motor_angles: (k,) [rad].
+        desired_motor_angles: (k,) [rad] what the winches are told for their motors to hold these.
         residual: largest unbalanced component over the weight, torques divided by 1 m.
     """
 
@@ -38,11 +42,16 @@ class RestState:
     chord_tension: Array
     tension_at_drawing_point: Array
     tension_at_attachment_point: Array
+    motor_angles: Array
+    desired_motor_angles: Array
     residual: float
 
 
 def rest_state(
-    robot: CableRobot, pose: RigidTransform | ArrayLike, rule: str = "minimum norm"
+    robot: CableRobot,
+    pose: RigidTransform | ArrayLike,
+    rule: str = "minimum norm",
+    wrench: ArrayLike | None = None,
 ) -> RestState:
     """Return the robot at rest at a pose, its chord tensions chosen by a rule.
 
@@ -54,6 +63,8 @@ def rest_state(
         pose: X_WP, or [roll, pitch, yaw, x, y, z] (rad, m).
         rule: "minimum norm", or "within limits": inside the robot's tension limits and closest to
             their middle.
+        wrench: (6,) [torque; force] on the platform at its origin in W, besides weight and cables;
+            none if None.
 
     Raises:
         GeometryError: the wrench matrix has rank below 6.
@@ -66,7 +77,8 @@ def rest_state(
     geometry = cable_geometry(robot, X_WP)
     matrix = wrench_matrix(geometry)
     check_rank(matrix)
-    weight = gravity_wrench(robot, X_WP)
+    external = np.zeros(6) if wrench is None else np.asarray(wrench, float)
+    load = gravity_wrench(robot, X_WP) + external
     w, cable = robot.weight_per_metre, robot.cable
     k = robot.num_cables
     sin_beta0 = geometry.Bz / geometry.L
@@ -77,7 +89,7 @@ def rest_state(
     upwards = wrench_at(geometry.EB, geometry.z)
     for _ in range(200):
         previous = T
-        T = distribute(robot, matrix, weight - upwards.T @ sag, rule, X_WP)
+        T = distribute(robot, matrix, load - upwards.T @ sag, rule, X_WP)
         H = T * geometry.Bx / geometry.L
         for i in range(k):
             V_B[i], l0[i], status = irvine_from_horizontal(
@@ -91,8 +103,8 @@ def rest_state(
         if np.max(np.abs(T - previous)) <= 1e-14 * np.max(np.abs(T)):
             break
     length = l0 + cable.drum_run / (1.0 + T_A / EA)
-    wrench, _, out = platform_balance(robot, X_WP, length)
-    residual = _relative(robot, wrench)
+    unbalanced, _, out = platform_balance(robot, X_WP, length)
+    residual = _relative(robot, unbalanced + external)
     if not residual <= 1e3 * TOLERANCE:
         raise EquilibriumError(
             f"no rest state found: residual {residual:.2e} of the weight; limiting cable "
@@ -133,6 +145,7 @@ def forward_kinematics(
     length: ArrayLike,
     guess: RigidTransform | ArrayLike,
     max_iterations: int = 1000,
+    wrench: ArrayLike | None = None,
 ) -> RestState:
     """Return the equilibrium pose of the platform hanging on cables of given unstrained lengths.
 
@@ -144,6 +157,8 @@ def forward_kinematics(
         length: (k,) [m] total unstrained lengths, run from drum to eyelet included.
         guess: a pose to start from, X_WP or [roll, pitch, yaw, x, y, z] (rad, m).
         max_iterations: after how many evaluations to give up.
+        wrench: (6,) [torque; force] on the platform at its origin in W, besides weight and cables;
+            none if None. From the equilibrium without it the platform follows by Newton's steps.
 
     Raises:
         EquilibriumError: no equilibrium was found from this guess; names the residual and the
@@ -156,11 +171,11 @@ def forward_kinematics(
     if length.shape != (k,) or not np.all(length > 0.0):
         raise ValueError(f"lengths must be {k} positive numbers, got {length}")
     R, p = pose_arrays(as_pose(guess))
-    out, jacobian, wrench = np.zeros((k, 14)), np.zeros((k, 14, 8)), np.zeros(6)
+    out, jacobian, unbalanced = np.zeros((k, 14)), np.zeros((k, 14, 8)), np.zeros(6)
     arrays = RobotArrays(robot)
     status, residual = find_equilibrium(
         R, p, length, arrays.points, arrays.constants, arrays.body,
-        TOLERANCE, max_iterations, out, jacobian, wrench,
+        TOLERANCE, max_iterations, out, jacobian, unbalanced,
     )  # fmt: skip
     if status:
         raise EquilibriumError(f"cable {status} has no catenary at this pose and length")
@@ -170,19 +185,45 @@ def forward_kinematics(
             f"no equilibrium for these lengths: residual {residual:.2e} of the weight; limiting "
             f"cable {slackest + 1} ({out[slackest, 3]:.2f} N at the drawing point)"
         )
-    return _state(robot, RigidTransform(RotationMatrix(R), p), length, out, residual)
+    X_WP = RigidTransform(RotationMatrix(R), p)
+    if wrench is not None and np.any(wrench):
+        return _moved_by(robot, length, X_WP, np.asarray(wrench, float))
+    return _state(robot, X_WP, length, out, residual)
+
+
+def _moved_by(robot: CableRobot, length: Array, X_WP: RigidTransform, wrench: Array) -> RestState:
+    """Return the rest of a platform that a wrench moves from its rest X_WP."""
+    for _ in range(50):
+        unbalanced, stiffness, out = platform_balance(robot, X_WP, length)
+        residual = _relative(robot, unbalanced + wrench)
+        if residual <= 10.0 * TOLERANCE:
+            break
+        step = -np.linalg.solve(stiffness, unbalanced + wrench)
+        turn, shift = np.linalg.norm(step[:3]), np.linalg.norm(step[3:])
+        step /= max(1.0, float(turn) / 0.3, float(shift))  # [rad], [m]
+        R = RotationMatrix(exp_rotation(step[:3])) @ X_WP.rotation()
+        X_WP = RigidTransform(R, X_WP.translation() + step[3:])
+    if not residual <= 1e3 * TOLERANCE:
+        raise EquilibriumError(
+            f"no equilibrium under the wrench {np.array2string(wrench, precision=3)}: "
+            f"residual {residual:.2e} of the weight"
+        )
+    return _state(robot, X_WP, length, out, residual)
 
 
 def _state(
     robot: CableRobot, X_WP: RigidTransform, length: Array, out: Array, residual: float
 ) -> RestState:
     geometry = cable_geometry(robot, X_WP)
+    angles = motor_angles(robot, length)
     return RestState(
         X_WP=X_WP,
         unstrained_length=length,
         chord_tension=out[:, 12] * geometry.L / geometry.Bx,
         tension_at_drawing_point=out[:, 3],
         tension_at_attachment_point=out[:, 4],
+        motor_angles=angles,
+        desired_motor_angles=WinchModel(robot).at_rest(angles, out[:, 3])[1],
         residual=residual,
     )
 

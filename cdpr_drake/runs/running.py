@@ -19,7 +19,7 @@ from cdpr_drake.analysis.stability import StabilityWarning
 from cdpr_drake.analysis.step_size import StepWarning, step_error, step_limit
 from cdpr_drake.diagrams import (
     Record,
-    leaf_systems,
+    blocks,
     make_joint_space_control,
     make_vision_based_control,
     rest_context,
@@ -367,7 +367,7 @@ def _evaluate_all(loop: Diagram, context: Context) -> None:
     loop.EvalTimeDerivatives(context)
     for index in range(loop.num_output_ports()):
         loop.get_output_port(index).Eval(context)
-    for path, system in leaf_systems(loop):
+    for path, system in blocks(loop):
         if path[-1] == "servo":  # sampled: no output of the loop needs it before the first frame
             system.GetOutputPort("motor_rates").Eval(system.GetMyContextFromRoot(context))
 

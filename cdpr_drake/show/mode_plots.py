@@ -18,10 +18,10 @@ from cdpr_drake.analysis.stability import StabilityMap
 from cdpr_drake.model.kinematics import cable_ends
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, pose_to_vector
+from cdpr_drake.model.signals import ERROR, POSE
 from cdpr_drake.show.plots import _figure, _legend_below, spread
 from cdpr_drake.show.style import REFERENCE, RUN_COLOURS, cable_colour
 from cdpr_drake.study.modes import Mode, Modes
-from cdpr_drake.study.names import ERROR, POSE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

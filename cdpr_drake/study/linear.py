@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
-from pydrake.autodiffutils import InitializeAutoDiff
-from pydrake.systems.framework import PortDataType
+from pydrake.systems.framework import Context, Diagram, InputPort, OutputPort, PortDataType
 
+from cdpr_drake.diagrams.blocks import blocks
 from cdpr_drake.errors import LinearizationError
-from cdpr_drake.study.names import block_name, leaves, vector_names
-from cdpr_drake.study.state_space import Array, StateSpace
-from cdpr_drake.study.twin import open_ports_named, twin_of, value_and_gradient
+from cdpr_drake.model.signals import vector_names
+from cdpr_drake.study.first_order import first_order, port_value
+from cdpr_drake.study.names import continuous_state_names
+from cdpr_drake.study.state_space import StateSpace
+from cdpr_drake.study.twin import open_ports_named
 
 
 class LinearizationWarning(UserWarning):
@@ -21,8 +22,8 @@ class LinearizationWarning(UserWarning):
 
 
 def linearize(
-    diagram: Any,
-    context: Any,
+    diagram: Diagram,
+    context: Context,
     inputs: Iterable[str] | None = None,
     outputs: Iterable[str] | None = None,
     *,
@@ -30,7 +31,8 @@ def linearize(
 ) -> StateSpace:
     """Return the linear model of a continuous diagram about a context, by its ports' names.
 
-    dx/dt = f0 + A (x - x0) + B (u - u0), y = y0 + C (x - x0) + D (u - u0), by AutoDiffXd. The
+    dx/dt = f0 + A (x - x0) + B (u - u0), y = y0 + C (x - x0) + D (u - u0), by AutoDiffXd,
+    block by block with differences for those that have none (`by_differences` names them). The
     diagram is converted at the first call; later ones take milliseconds. The time stands still: the
     gain of a control law is what it is at the context's time, and a LinearizationWarning says so
     where that is still on its ramp (`equilibrium` gives a context past it).
@@ -46,9 +48,9 @@ def linearize(
             `derivatives`.
 
     Raises:
-        LinearizationError: a block has discrete or abstract state, or knows no AutoDiffXd; an input
-            port without which nothing can be computed is open; no equilibrium, where one is
-            required. The message names block or port.
+        LinearizationError: a block has discrete or abstract state, or an abstract input and no
+            AutoDiffXd; an input port without which nothing can be computed is open; no
+            equilibrium, where one is required. The message names block or port.
         KeyError: there is no port of that name.
     """
     return Linearizer(diagram)._linearize(context, inputs, outputs, require_equilibrium)
@@ -61,23 +63,22 @@ class Linearizer:
         diagram: any diagram, or a single system, all of its state continuous.
 
     Raises:
-        LinearizationError: a block has discrete or abstract state, or knows no AutoDiffXd.
+        LinearizationError: a block has discrete or abstract state.
     """
 
-    def __init__(self, diagram: Any) -> None:
-        for path, leaf in leaves(diagram):
-            if leaf.num_discrete_state_groups():
+    def __init__(self, diagram: Diagram) -> None:
+        for block in blocks(diagram):
+            if block.system.num_discrete_state_groups():
                 raise LinearizationError(
-                    f"{block_name(path, leaf)} has discrete state: linearize takes all-continuous "
-                    "diagrams (sample_time=None, no noise sources); for a sampled loop ask "
-                    "one_period_map"
+                    f"{block} has discrete state: linearize takes all-continuous diagrams "
+                    "(sample_time=None, no noise sources); for a sampled loop ask one_period_map"
                 )
         self.diagram = diagram
-        self._twin = twin_of(diagram)
+        self._states = continuous_state_names(diagram)
 
     def __call__(
         self,
-        context: Any,
+        context: Context,
         inputs: Iterable[str] | None = None,
         outputs: Iterable[str] | None = None,
         *,
@@ -95,44 +96,32 @@ class Linearizer:
 
     def _linearize(
         self,
-        context: Any,
+        context: Context,
         inputs: Iterable[str] | None,
         outputs: Iterable[str] | None,
         require_equilibrium: bool | None,
     ) -> StateSpace:
-        diagram, system = self.diagram, self._twin.system
+        diagram, n = self.diagram, len(self._states)
         with open_ports_named(diagram, "linearize"):
             in_ports = input_ports(diagram, context, inputs)
             out_ports = output_ports(diagram, outputs)
-            own = self._twin.context(diagram, context)
-            width = sum(port.size() for port in in_ports)
-            n = self._twin.seed(context, own, width=width)
-            total, column, u0 = n + width, n, []
-            for port in in_ports:
-                u = port_value(port, context)
-                dual = InitializeAutoDiff(u, total, column).ravel()
-                system.get_input_port(port.get_index()).FixValue(own, dual)
-                column += u.size
-                u0.append(u)
-            derivatives = system.EvalTimeDerivatives(own).CopyToVector()
-            y = [system.get_output_port(port.get_index()).Eval(own) for port in out_ports]
-        f0, AB = value_and_gradient(derivatives, total)
-        values = [value_and_gradient(v, total) for v in y]
-        y0 = np.concatenate([v for v, _ in values]) if values else np.zeros(0)
-        CD = np.vstack([g for _, g in values]) if values else np.zeros((0, total))
+            found = first_order(diagram, context, in_ports, out_ports)
+        (f0, AB), (y0, CD) = found.f, found.y
+        u0 = [port_value(port, context) for port in in_ports]
         model = StateSpace(
             A=AB[:, :n],
             B=AB[:, n:],
             C=CD[:, :n],
             D=CD[:, n:],
-            states=self._twin.states,
+            states=self._states,
             inputs=port_names(in_ports),
             outputs=port_names(out_ports),
             time=context.get_time(),
             x0=context.get_continuous_state_vector().CopyToVector() if n else np.zeros(0),
-            u0=np.concatenate(u0) if u0 else np.zeros(0),
+            u0=np.concatenate([np.zeros(0), *u0]),
             y0=y0,
             derivatives=f0,
+            by_differences=found.by_differences,
         )
         self._check(model, require_equilibrium)
         return model
@@ -151,28 +140,28 @@ class Linearizer:
         warnings.warn(message, LinearizationWarning, stacklevel=4)
 
 
-def warn_on_ramp(diagram: Any, time: float, stacklevel: int = 2) -> None:
-    """Warn of each control law of a diagram whose gain is still rising at a time.
+def warn_on_ramp(diagram: Diagram, time: float, stacklevel: int = 2) -> None:
+    """Warn of each block of a diagram that does something else later: whose gain still rises.
 
     Args:
         diagram: the diagram.
         time: [s].
         stacklevel: as for `warnings.warn`.
     """
-    for path, leaf in leaves(diagram):
-        settings: Any = getattr(leaf, "settings", None)
-        gain_at = getattr(settings, "gain_at", None)
-        if gain_at is not None and gain_at(time) < settings.gain:
+    for block in blocks(diagram):
+        steady_after = block.answer("steady_after")
+        if steady_after is not None and time < steady_after:
+            describe = block.answer("transient")
+            what = f"has {describe(time)}" if describe is not None else "is on its way"
             warnings.warn(
-                f"{block_name(path, leaf)} has a gain of {gain_at(time):g}/s at t = {time:g} s, on "
-                f"its way to {settings.gain:g}/s: set the context's time to "
-                f"{settings.ramp_time:g} s or later",
+                f"{block} {what} at t = {time:g} s: set the context's time to "
+                f"{steady_after:g} s or later",
                 LinearizationWarning,
                 stacklevel=stacklevel,
             )
 
 
-def input_ports(diagram: Any, context: Any, names: Iterable[str] | None) -> list[Any]:
+def input_ports(diagram: Diagram, context: Context, names: Iterable[str] | None) -> list[InputPort]:
     """Return the vector input ports of the given names, or those that have a value.
 
     Args:
@@ -196,7 +185,7 @@ def input_ports(diagram: Any, context: Any, names: Iterable[str] | None) -> list
     return ports
 
 
-def output_ports(diagram: Any, names: Iterable[str] | None) -> list[Any]:
+def output_ports(diagram: Diagram, names: Iterable[str] | None) -> list[OutputPort]:
     """Return the vector output ports of the given names, or all of them.
 
     Args:
@@ -212,17 +201,7 @@ def output_ports(diagram: Any, names: Iterable[str] | None) -> list[Any]:
     return [_port(diagram, name, "output") for name in _listed(names)]
 
 
-def port_value(port: Any, context: Any) -> Array:
-    """Return what an input port reads, zeros if it is open.
-
-    Args:
-        port: the port.
-        context: its diagram's context.
-    """
-    return port.Eval(context) if port.HasValue(context) else np.zeros(port.size())
-
-
-def port_names(ports: Iterable[Any]) -> tuple[str, ...]:
+def port_names(ports: Iterable[InputPort | OutputPort]) -> tuple[str, ...]:
     """Return the names of all entries of some ports.
 
     Args:
@@ -235,11 +214,11 @@ def _listed(names: Iterable[str]) -> list[str]:
     return [names] if isinstance(names, str) else list(names)
 
 
-def _is_vector(port: Any) -> bool:
+def _is_vector(port: InputPort | OutputPort) -> bool:
     return port.get_data_type() == PortDataType.kVectorValued
 
 
-def _port(diagram: Any, name: str, kind: str) -> Any:
+def _port(diagram: Diagram, name: str, kind: str) -> InputPort | OutputPort:
     has = diagram.HasInputPort if kind == "input" else diagram.HasOutputPort
     get = diagram.GetInputPort if kind == "input" else diagram.GetOutputPort
     port = get(name) if has(name) else None

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cdpr_drake.study.names import ERROR, POSE, TWIST
+from cdpr_drake.model.signals import ERROR, POSE, TWIST
 from cdpr_drake.study.sampled import OnePeriodMap
 from cdpr_drake.study.state_space import Array, StateSpace
 

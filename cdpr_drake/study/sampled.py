@@ -13,14 +13,16 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydrake.systems.framework import Context, Diagram
 
+from cdpr_drake.diagrams.blocks import blocks
 from cdpr_drake.errors import LinearizationError
+from cdpr_drake.study.first_order import first_order
 from cdpr_drake.study.linear import LinearizationWarning, warn_on_ramp
-from cdpr_drake.study.names import block_name, group_sizes, leaves
+from cdpr_drake.study.names import continuous_state_names, discrete_state_names
 from cdpr_drake.study.state_space import EQUILIBRIUM_TOLERANCE, Array
 from cdpr_drake.study.twin import open_ports_named, twin_of, value_and_gradient
 
@@ -37,12 +39,14 @@ class OnePeriodMap:
         period: T [s].
         states: n names, continuous states first, then discrete ones.
         drift: (n,) change of the state over a period at the point itself, zero at a rest.
+        by_differences: names of the blocks that know no AutoDiffXd, linearised by differences.
     """
 
     matrix: Array
     period: float
     states: tuple[str, ...]
     drift: Array
+    by_differences: tuple[str, ...] = ()
 
     @property
     def eigenvalues(self) -> NDArray[np.complex128]:
@@ -70,6 +74,7 @@ class HybridModel:
         states: n + m names.
         derivatives: (n,) dx/dt at the point.
         mismatch: (m,) change of d by its updates at the point.
+        by_differences: names of the blocks that know no AutoDiffXd, linearised by differences.
     """
 
     A: Array
@@ -79,6 +84,7 @@ class HybridModel:
     states: tuple[str, ...]
     derivatives: Array
     mismatch: Array
+    by_differences: tuple[str, ...] = ()
 
     def map(self) -> OnePeriodMap:
         """Return the one-period map: flows and updates multiplied in the order of time."""
@@ -91,7 +97,13 @@ class HybridModel:
             M[n + rows] = update @ M
         M[:n] = self._flow(self.period - now) @ M
         drift = np.concatenate([self.period * self.derivatives, self.mismatch])
-        return OnePeriodMap(matrix=M, period=self.period, states=self.states, drift=drift)
+        return OnePeriodMap(
+            matrix=M,
+            period=self.period,
+            states=self.states,
+            drift=drift,
+            by_differences=self.by_differences,
+        )
 
     def flow(self, duration: float) -> Array:
         """Return (n + m, n + m): z after a time without events.
@@ -131,7 +143,7 @@ class HybridModel:
 
 
 def one_period_map(
-    diagram: Any, context: Any, *, require_equilibrium: bool | None = None
+    diagram: Diagram, context: Context, *, require_equilibrium: bool | None = None
 ) -> OnePeriodMap:
     """Return the exact Jacobian of one period of a sampled loop about a rest.
 
@@ -163,7 +175,7 @@ def one_period_map(
     return result
 
 
-def hybrid_model(diagram: Any, context: Any) -> HybridModel:
+def hybrid_model(diagram: Diagram, context: Context) -> HybridModel:
     """Return the linear pieces of a sampled loop about a context; see `one_period_map`.
 
     Args:
@@ -174,46 +186,33 @@ def hybrid_model(diagram: Any, context: Any) -> HybridModel:
         LinearizationError: as for `one_period_map`.
     """
     schedule, period = _schedule(diagram)
-    twin = twin_of(diagram)
-    system = twin.system
     with open_ports_named(diagram, "one_period_map"):
-        own = twin.context(diagram, context)
-        total = twin.seed(context, own, discrete=True)
-        n = len(twin.states)
-        derivatives = system.EvalTimeDerivatives(own).CopyToVector()
-        f0, AE = value_and_gradient(derivatives, total)
-        events, mismatch, first = [], [], 0
-        blocks = zip(leaves(diagram), leaves(system), strict=True)
-        for (path, leaf), (_, twin_leaf) in blocks:
-            sizes = group_sizes(leaf)
-            if not sizes:
-                continue
-            twin_context = twin_leaf.GetMyContextFromRoot(own)
-            after = twin_leaf.EvalUniquePeriodicDiscreteUpdate(twin_context)
-            rows = first + np.arange(sum(sizes))
-            pairs = [
-                value_and_gradient(after.get_vector(group).CopyToVector(), total)
-                for group in range(len(sizes))
-            ]
-            state = leaf.GetMyContextFromRoot(context).get_discrete_state()
-            before = [state.get_vector(group).CopyToVector() for group in range(len(sizes))]
-            mismatch.append(np.concatenate([v for v, _ in pairs]) - np.concatenate(before))
-            update = np.vstack([g for _, g in pairs])
-            events += [(offset, rows, update) for offset in schedule[path]]
-            first += rows.size
+        found = first_order(diagram, context, [], [], discrete=True)
+    n = len(found.f[0])
+    events, before, first = [], [], 0
+    for block in blocks(diagram):
+        sizes = block.group_sizes
+        if not sizes:
+            continue
+        rows = first + np.arange(sum(sizes))
+        state = block.context(context).get_discrete_state()
+        before += [state.get_vector(group).CopyToVector() for group in range(len(sizes))]
+        events += [(offset, rows, found.update[1][rows]) for offset in schedule[block.path]]
+        first += rows.size
     return HybridModel(
-        A=AE[:, :n],
-        E=AE[:, n:],
+        A=found.f[1][:, :n],
+        E=found.f[1][:, n:],
         events=tuple(events),
         period=period,
-        states=twin.states + twin.discrete_states,
-        derivatives=f0,
-        mismatch=np.concatenate(mismatch),
+        states=continuous_state_names(diagram) + discrete_state_names(diagram),
+        derivatives=found.f[0],
+        mismatch=found.update[0] - np.concatenate(before),
+        by_differences=found.by_differences,
     )
 
 
 def simulated_period_map(
-    diagram: Any, context: Any, *, step: float = 2.5e-4, periods: int = 1
+    diagram: Diagram, context: Context, *, step: float = 2.5e-4, periods: int = 1
 ) -> Array:
     """Return the Jacobian (n, n) of a simulated period, by Drake's own simulator in AutoDiffXd.
 
@@ -234,6 +233,8 @@ def simulated_period_map(
 
     _, period = _schedule(diagram)
     twin = twin_of(diagram)
+    if twin is None:
+        raise LinearizationError("a block of the diagram does not support AutoDiffXd")
     own = twin.context(diagram, context)
     total = twin.seed(context, own, discrete=True)
     simulator = Simulator_[AutoDiffXd](twin.system, own)
@@ -246,21 +247,18 @@ def simulated_period_map(
     return value_and_gradient(np.concatenate([x, *d]), total)[1]
 
 
-def _schedule(diagram: Any) -> tuple[dict[tuple[str, ...], list[float]], float]:
+def _schedule(diagram: Diagram) -> tuple[dict[tuple[str, ...], list[float]], float]:
     """Return when in the period each block with discrete state updates, and the period [s]."""
     found = {}
-    for path, leaf in leaves(diagram):
+    for block in blocks(diagram):
+        path, leaf = block
         if leaf.num_abstract_states():
-            raise LinearizationError(
-                f"{block_name(path, leaf)} has abstract state, which has no derivative"
-            )
+            raise LinearizationError(f"{block} has abstract state, which has no derivative")
         if not leaf.num_discrete_state_groups():
             continue
         event = leaf.GetUniquePeriodicDiscreteUpdateAttribute()
         if event is None:
-            raise LinearizationError(
-                f"{block_name(path, leaf)} has discrete state without one periodic update"
-            )
+            raise LinearizationError(f"{block} has discrete state without one periodic update")
         found[path] = (event.period_sec(), event.offset_sec())
     if not found:
         raise LinearizationError(

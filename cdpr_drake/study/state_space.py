@@ -33,6 +33,7 @@ class StateSpace:
         u0: (m,) input.
         y0: (p,) output.
         derivatives: f0 (n,), zero at an equilibrium.
+        by_differences: names of the blocks that know no AutoDiffXd, linearised by differences.
     """
 
     A: Array
@@ -47,6 +48,7 @@ class StateSpace:
     u0: Array
     y0: Array
     derivatives: Array
+    by_differences: tuple[str, ...] = ()
 
     @property
     def is_equilibrium(self) -> bool:

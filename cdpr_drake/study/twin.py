@@ -6,60 +6,36 @@ import re
 import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.autodiffutils import ExtractGradient, ExtractValue, InitializeAutoDiff
+from pydrake.systems.framework import Context, System
 
+from cdpr_drake.diagrams.blocks import blocks, fed_ports
 from cdpr_drake.errors import LinearizationError
-from cdpr_drake.study.names import (
-    block_name,
-    continuous_state_names,
-    discrete_state_names,
-    group_sizes,
-    leaves,
-)
 
 Array = NDArray[np.float64]
 
-_TWINS: weakref.WeakKeyDictionary[Any, Twin] = weakref.WeakKeyDictionary()
+_TWINS: weakref.WeakKeyDictionary[System, Twin | None] = weakref.WeakKeyDictionary()
 
 
 class Twin:
-    """A diagram's AutoDiffXd copy, the names of its states, and no reference to the original.
+    """A diagram's AutoDiffXd copy, and no reference to the original.
 
     Use `twin_of`, which converts a diagram once: every conversion costs tens of milliseconds, and
     Drake 1.51 never frees one.
 
     Args:
-        diagram: the diagram, or a single system.
-
-    Raises:
-        LinearizationError: a block does not support AutoDiffXd, or its state is abstract; names
-            the block.
+        system: the copy.
     """
 
-    def __init__(self, diagram: Any) -> None:
-        for path, leaf in leaves(diagram):
-            if leaf.num_abstract_states():
-                raise LinearizationError(
-                    f"{block_name(path, leaf)} has abstract state, which has no derivative"
-                )
-        system = diagram.ToAutoDiffXdMaybe()
-        if system is None:
-            for path, leaf in leaves(diagram):
-                if leaf.ToAutoDiffXdMaybe() is None:
-                    raise LinearizationError(
-                        f"{block_name(path, leaf)} does not support AutoDiffXd"
-                    )
-            raise LinearizationError(f'"{diagram.get_name()}" does not support AutoDiffXd')
+    def __init__(self, system: System) -> None:
         self.system = system
-        self.states = continuous_state_names(diagram)
-        self.discrete_states = discrete_state_names(diagram)
-        self.group_sizes = [n for _, leaf in leaves(diagram) for n in group_sizes(leaf)]
+        self.num_states = system.num_continuous_states()
+        self.group_sizes = [n for block in blocks(system) for n in block.group_sizes]
 
-    def context(self, diagram: Any, context: Any) -> Any:
+    def context(self, diagram: System, context: Context) -> Context:
         """Return a new AutoDiffXd context with the time, state, parameters and inputs of another.
 
         Args:
@@ -71,7 +47,7 @@ class Twin:
         self.system.FixInputPortsFrom(diagram, context, own)
         return own
 
-    def seed(self, context: Any, own: Any, discrete: bool = False, width: int = 0) -> int:
+    def seed(self, context: Context, own: Context, discrete: bool = False, width: int = 0) -> int:
         """Make the states of an AutoDiffXd context the first independent variables.
 
         Args:
@@ -83,7 +59,7 @@ class Twin:
         Returns:
             number of states that are variables now.
         """
-        n = len(self.states)
+        n = self.num_states
         total = n + width + (sum(self.group_sizes) if discrete else 0)
         if n:
             x = context.get_continuous_state_vector().CopyToVector()
@@ -97,22 +73,22 @@ class Twin:
         return n
 
 
-def twin_of(diagram: Any) -> Twin:
+def twin_of(diagram: System) -> Twin | None:
     """Return the twin of a diagram, converted the first time and kept as long as the diagram.
 
     Args:
         diagram: the diagram, or a single system.
 
-    Raises:
-        LinearizationError: see `Twin`.
+    Returns:
+        None if a block does not support AutoDiffXd.
     """
-    twin = _TWINS.get(diagram)
-    if twin is None:
-        twin = _TWINS[diagram] = Twin(diagram)
-    return twin
+    if diagram not in _TWINS:
+        converted = diagram.ToAutoDiffXdMaybe()
+        _TWINS[diagram] = None if converted is None else Twin(converted)
+    return _TWINS[diagram]
 
 
-def value_and_gradient(y: NDArray[Any], width: int) -> tuple[Array, Array]:
+def value_and_gradient(y: np.ndarray, width: int) -> tuple[Array, Array]:
     """Return the values (p,) and the derivatives (p, width), zero where `y` carries none.
 
     Args:
@@ -129,7 +105,7 @@ def value_and_gradient(y: NDArray[Any], width: int) -> tuple[Array, Array]:
 
 
 @contextmanager
-def open_ports_named(diagram: Any, what: str) -> Iterator[None]:
+def open_ports_named(diagram: System, what: str) -> Iterator[None]:
     """Turn Drake's complaint about a required input port that is open into a LinearizationError.
 
     Args:
@@ -143,7 +119,7 @@ def open_ports_named(diagram: Any, what: str) -> Iterator[None]:
         if found is None:
             raise
         port, path = found["port"], tuple(found["path"].strip(":").split("::")[1:])
-        exported = {leaf: name for name, leaf in _exported_inputs(diagram)}.get((path, port))
+        exported = {(at, fed): name for name, at, fed in fed_ports(diagram)}.get((path, port))
         shown = f'input port "{exported or port}" is open'
         if path:
             shown += f', and block "{"/".join(path)}" needs it'
@@ -151,19 +127,3 @@ def open_ports_named(diagram: Any, what: str) -> Iterator[None]:
 
 
 _OPEN_PORT = re.compile(r"required InputPort\[\d+\] \((?P<port>.*?)\) of System (?P<path>\S+) ")
-
-
-def _exported_inputs(diagram: Any) -> Iterator[tuple[str, tuple[tuple[str, ...], str]]]:
-    """Yield (name, (path, port)) for each leaf's port that an input of the diagram feeds."""
-    if not hasattr(diagram, "GetSystems"):
-        return
-    for i in range(diagram.num_input_ports()):
-        port = diagram.get_input_port(i)
-        for system, index in diagram.GetInputPortLocators(port.get_index()):
-            inner = system.get_input_port(index).get_name()
-            block = system.get_name()
-            if not hasattr(system, "GetSystems"):
-                yield port.get_name(), ((block,), inner)
-            for name, (path, leaf_port) in _exported_inputs(system):
-                if name == inner:
-                    yield port.get_name(), ((block, *path), leaf_port)

@@ -190,6 +190,16 @@ def lift(function: Any, at: tuple[Any, ...], *args: np.ndarray) -> np.ndarray:
     return function(*at)
 
 
+def numbered(*groups: str, count: int) -> tuple[str, ...]:
+    """Return names of states: the groups one after another, each counting from 1.
+
+    Args:
+        groups: what they are.
+        count: of entries in each.
+    """
+    return tuple(f"{group}[{i + 1}]" for group in groups for i in range(count))
+
+
 def seconds(context: Context) -> float:
     """Return the time of a context as a plain number.
 

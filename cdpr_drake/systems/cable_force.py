@@ -7,7 +7,10 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from cdpr_drake.errors import CableError
 from cdpr_drake.model.cables import CableSet, packed_sizes
+from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.rotations import vector_to_pose
+from cdpr_drake.model.statics import wrench_matrix
 from cdpr_drake.systems._template import (
     chain,
     check_finite,
@@ -66,7 +69,7 @@ class CatenaryCableForce(LeafSystem):
 
     def __init__(self, robot: CableRobot) -> None:
         super().__init__()
-        self.robot = robot
+        self.robot = self.cable_robot = robot
         self._cables = CableSet(robot)
         k = robot.num_cables
         self._state_port = self.DeclareVectorInputPort("platform_state", 12)
@@ -81,6 +84,14 @@ class CatenaryCableForce(LeafSystem):
             part = part_of_port(self._packed_port, slice(start, start + size))
             self.DeclareVectorOutputPort(name, size, part, {self.all_input_ports_ticket()})
             start += size
+
+    def wrench_scale(self, context: Context) -> tuple[float, float]:
+        """Return the largest torque [N m] and force [N] of any cable in a `context`."""
+        X_WP = vector_to_pose(self._state_port.Eval(context)[:6])
+        start = 6 + self.robot.num_cables
+        pull = np.abs(self._packed_port.Eval(context)[start : start + self.robot.num_cables])
+        arms = np.linalg.norm(wrench_matrix(cable_geometry(self.robot, X_WP))[:3], axis=0)
+        return float(np.max(pull * arms)), float(np.max(pull))
 
     def _solve(self, context: Context, output: BasicVector) -> None:
         args = (

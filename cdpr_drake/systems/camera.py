@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
+from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from cdpr_drake.model.camera import MeasuredPose
+from cdpr_drake.model.camera import MeasuredPose, true_from_seen
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.systems._template import (
     chain,
@@ -53,6 +55,10 @@ class CameraMeasurement(LeafSystem):
         self._noise_port = noise_input(self, 6)
         tickets = {self._pose_port.ticket(), self._noise_port.ticket()}
         self.DeclareVectorOutputPort("measured_pose", 6, self._calc_pose, tickets)
+
+    def true_pose(self, robot: CableRobot, seen: RigidTransform | ArrayLike) -> RigidTransform:
+        """Return X_WP of the true `robot` when it is measured at the pose `seen`."""
+        return true_from_seen(robot, self.calibrated, seen)
 
     def _calc_pose(self, context: Context, output: BasicVector) -> None:
         pose = self._pose_port.Eval(context)

@@ -6,8 +6,10 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem, OutputPort
 
 from cdpr_drake.model.cables import CableSet, packed_sizes
+from cdpr_drake.model.equilibrium import RestState
+from cdpr_drake.model.rest_model import mass_matrix
 from cdpr_drake.model.robot import CableRobot
-from cdpr_drake.model.rotations import Array
+from cdpr_drake.model.rotations import Array, pose_to_vector, vector_to_pose
 from cdpr_drake.model.winch import WinchModel
 from cdpr_drake.systems._template import Calc, check_finite, noise_input, part_of_port
 from cdpr_drake.systems.cable_force import raise_cable_error
@@ -89,6 +91,24 @@ class FusedPlant(LeafSystem):
         self._state_port = self.DeclareStateOutputPort("state", state)
         self._packed_port = self._declare("packed", sum(packed_sizes(k).values()), self._solve)
         self._declare_outputs()
+        self.cable_robot = robot
+
+    def set_at_rest(self, context: Context, rest: RestState) -> None:
+        """Put all of the plant where it rests in a `rest`, in a `context`."""
+        tension, k = rest.tension_at_drawing_point, self._k
+        y = np.zeros(self._size)
+        y[:6] = pose_to_vector(rest.X_WP)
+        y[12 : 12 + 3 * k] = self._winch.at_rest(rest.motor_angles, tension)[0]
+        y[12 + 3 * k : -k] = np.tile(self.reading(tension), self.robot.load_cells.order)
+        y[-k:] = rest.desired_motor_angles
+        context.SetContinuousState(y)
+
+    def unbalanced_wrench(self, context: Context) -> Array:
+        """Return [torque; force] (6,) that the platform is out of balance by in a `context`."""
+        rate = self.EvalTimeDerivatives(context).CopyToVector()[6:12]
+        X_WP = vector_to_pose(self._state_port.Eval(context)[:6])
+        unbalanced: Array = mass_matrix(self.robot, X_WP.rotation().matrix()) @ rate
+        return unbalanced
 
     def reading(self, tension_at_winch: Array) -> Array:
         """Return what the load cells read without noise (k,) [N].

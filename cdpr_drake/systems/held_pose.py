@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from cdpr_drake.errors import GeometryError, SimulationError
+from cdpr_drake.model.camera import true_from_seen
+from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, pose_to_vector, vector_to_pose
 from cdpr_drake.model.vision.pose import PoseEstimate
 from cdpr_drake.systems._template import part_of_state
@@ -45,15 +48,17 @@ class HeldPose(LeafSystem):
     once. OpenCV works on plain numbers, so there is no AutoDiffXd.
 
     Args:
-        num_cameras: how many cameras there are.
+        calibrated: the robot as the controller believes it.
         sample_time: period T [s].
 
     Raises:
         SimulationError: at an update, when no pose has been measured yet and none can be.
     """
 
-    def __init__(self, num_cameras: int, sample_time: float) -> None:
+    def __init__(self, calibrated: CableRobot, sample_time: float) -> None:
         super().__init__()
+        self.calibrated = calibrated
+        num_cameras = len(calibrated.cameras.pose_cameras)
         self.num_cameras, self.sample_time = num_cameras, sample_time
         self.DeclareDiscreteState(_SIZE)
         self.DeclarePeriodicDiscreteUpdateEvent(sample_time, 0.0, self._update)
@@ -87,7 +92,11 @@ class HeldPose(LeafSystem):
         """
         raise NotImplementedError
 
-    def set_at_rest(self, context: Context) -> None:
+    def true_pose(self, robot: CableRobot, seen: RigidTransform | ArrayLike) -> RigidTransform:
+        """Return X_WP of the true `robot` when it is measured at the pose `seen`."""
+        return true_from_seen(robot, self.calibrated, seen)
+
+    def settle(self, context: Context) -> None:
         """Make the held pose what all cameras see now without noise.
 
         Args:

@@ -63,8 +63,7 @@ class ImageTargets(HeldPose):
     ) -> None:
         cameras = calibrated.cameras
         period = cameras.sample_time if sample_time is None else sample_time
-        super().__init__(len(cameras.pose_cameras), period)
-        self.calibrated = calibrated
+        super().__init__(calibrated, period)
         self._sizes = [(c.intrinsics.height, c.intrinsics.width) for c in cameras.pose_cameras]
         self._estimate = ImagePoseEstimator(calibrated, estimator)
         self._outages = Outages(outages, POSE_CAMERA, self.num_cameras)

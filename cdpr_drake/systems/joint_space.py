@@ -50,6 +50,10 @@ class InverseKinematicsAngles(LeafSystem):
             "motor_angles", robot.num_cables, self._calc_angles, {self._pose_port.ticket()}
         )
 
+    def motor_angles_at(self, X_WP: RigidTransform) -> np.ndarray:
+        """Return the motor angles (k,) [rad] for a desired pose `X_WP`."""
+        return self._inverse.motor_angles(X_WP)
+
     def _calc_angles(self, context: Context, output: BasicVector) -> None:
         pose = self._pose_port.Eval(context)
         check_finite(value(pose), self, context, "input desired_pose")

@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
 
+from cdpr_drake.model.equilibrium import RestState
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.vision.outages import LOAD_CELL, Outage, Outages
 from cdpr_drake.systems._template import (
     chain,
     check_finite,
     noise_input,
+    numbered,
     scalar_convertible,
     seconds,
     value,
@@ -68,6 +70,8 @@ class LoadCellFilter(LeafSystem):
         rate = np.full(robot.num_cables, 2.0 * np.pi * cells.cutoff)
         self._filter, self.parameters = filter_derivatives, np.array([gain, bias, sigma, rate])
         self._order = cells.order
+        stages = [f"stage_{i + 1}" for i in range(cells.order - 1)]
+        self.state_names = numbered(*stages, "tension", count=robot.num_cables)
         k = self._k = robot.num_cables
         self.outages = tuple(outages)
         self._outages = Outages(self.outages, LOAD_CELL, k)
@@ -83,6 +87,18 @@ class LoadCellFilter(LeafSystem):
             self.DeclareVectorOutputPort(
                 "measured_tension", k, self._calc_tension, {self.xc_ticket()}
             )
+
+    def set_at_rest(self, context: Context, rest: RestState) -> None:
+        """Have all filters show what the cells read in a `rest`, in a `context`."""
+        # At rest no eyelet's friction acts: winch and drawing point carry the same.
+        context.SetContinuousState(
+            np.tile(self.reading(rest.tension_at_drawing_point), self._order)
+        )
+
+    def residual_scale(self, context: Context) -> np.ndarray:
+        """Return the filters' rate times their readings in a `context`."""
+        x = np.abs(context.get_continuous_state_vector().CopyToVector())
+        return self.parameters[3, 0] * np.maximum(1.0, x)
 
     def reading(self, tension_at_winch: np.ndarray) -> np.ndarray:
         """Return the noiseless reading (k,) [N] for tensions (k,) [N], as the filter gets it.

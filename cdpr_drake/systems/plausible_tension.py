@@ -13,6 +13,7 @@ from cdpr_drake.systems._template import (
     chain,
     check_finite,
     finite_inputs,
+    numbered,
     scalar_convertible,
     value,
 )
@@ -63,18 +64,14 @@ class PlausibleTension(LeafSystem):
         needed = {self._pose_port.ticket(), self._tension_port.ticket()}
         if sample_time is not None:
             self.DeclareDiscreteState(3 * k)
+            groups = ("last_change", "expected_then", "stuck")
+            self.discrete_state_names = numbered(*groups, count=k)
             self.DeclarePeriodicDiscreteUpdateEvent(sample_time, 0.0, self._update)
             needed.add(self.xd_ticket())
         self.DeclareVectorOutputPort("plausible_tension", k, self._calc, needed)
         self.DeclareVectorOutputPort("cell_health", k, self._calc_health, needed)
 
-    @property
-    def discrete_state_names(self) -> list[str]:
-        """Names of the entries of the discrete state."""
-        groups = ("last_change", "expected_then", "stuck")
-        return [f"{group}[{i + 1}]" for group in groups for i in range(self._k)]
-
-    def set_at_rest(self, context: Context) -> None:
+    def settle(self, context: Context) -> None:
         """Make the memory that of live cells which read, and are expected to, what they do.
 
         Args:

@@ -6,12 +6,14 @@ import math
 
 from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
 
+from cdpr_drake.model.equilibrium import RestState
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.servo import MotorRateLaw, PoseErrorMap, ServoSettings
 from cdpr_drake.systems._template import (
     check_finite,
     finite_inputs,
     lift,
+    numbered,
     optional_input,
     scalar_convertible,
     seconds,
@@ -58,6 +60,7 @@ class PositionBasedVisualServo(LeafSystem):
         super().__init__()
         self.robot = robot
         self.settings = settings if settings is not None else ServoSettings()
+        self.steady_after = self.settings.ramp_time
         self._law = MotorRateLaw(robot, self.settings)
         self._error = PoseErrorMap(robot)
         k = self._k = robot.num_cables
@@ -70,6 +73,13 @@ class PositionBasedVisualServo(LeafSystem):
         poses = {self._pose_port.ticket(), self._desired_port.ticket()}
         self.DeclareVectorOutputPort("motor_rates", k, self._calc_rates, needed)
         self.DeclareVectorOutputPort("pose_error", 6, self._calc_error, poses)
+
+    def transient(self, time: float) -> str:
+        """Return what is still on its ramp at a `time` [s], "" if nothing is."""
+        s = self.settings
+        if time >= s.ramp_time:
+            return ""
+        return f"a gain of {s.gain_at(time):g}/s, on its way to {s.gain:g}/s"
 
     def _calc_rates(self, context: Context, output: BasicVector) -> None:
         args = (
@@ -149,6 +159,11 @@ class MotorAngleIntegrator(LeafSystem):
         state = self.DeclareContinuousState(num_cables)
         self._rates_port = self.DeclareVectorInputPort("motor_rates", num_cables)
         self.DeclareStateOutputPort("motor_angles", state)
+        self.state_names = numbered("angle", count=num_cables)
+
+    def set_at_rest(self, context: Context, rest: RestState) -> None:
+        """Ask for the motor angles of a `rest`, in a `context`."""
+        context.SetContinuousState(rest.desired_motor_angles)
 
     def DoCalcTimeDerivatives(self, context: Context, derivatives: ContinuousState) -> None:
         """Write the derivatives of the state in a context."""

@@ -64,7 +64,7 @@ class StereoCameras(LeafSystem):
             self.DeclareVectorOutputPort(name, size, part, {self.xd_ticket()})
             start += size
 
-    def set_at_rest(self, context: Context) -> None:
+    def settle(self, context: Context) -> None:
         """Make the held directions what all pairs see now without noise.
 
         Args:

@@ -67,9 +67,8 @@ class TargetCameras(HeldPose):
         outages: tuple[Outage, ...] = (),
     ) -> None:
         period = robot.cameras.sample_time if sample_time is None else sample_time
-        super().__init__(len(robot.cameras.pose_cameras), period)
+        super().__init__(calibrated if calibrated is not None else robot, period)
         self.robot = robot
-        self.calibrated = calibrated if calibrated is not None else robot
         self._images = TargetImages(robot)
         self._estimate = PoseEstimator(self.calibrated, estimator)
         self._outages = Outages(outages, POSE_CAMERA, self.num_cameras)

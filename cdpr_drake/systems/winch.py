@@ -5,9 +5,13 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, ContinuousState, LeafSystem
 
+from cdpr_drake.model.equilibrium import RestState
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.winch import WinchModel
-from cdpr_drake.systems._template import check_finite, lift, scalar_convertible, value
+from cdpr_drake.systems._template import check_finite, lift, numbered, scalar_convertible, value
+
+AT_REST = 1e-6
+"""How far desired motor angles may be from those of a rest, relative to these."""
 
 
 @scalar_convertible
@@ -68,6 +72,32 @@ class WinchDynamics(LeafSystem):
             "tension_at_winch", k, self._calc_tension, own | {self._tension_port.ticket()}
         )
         self._state_port = self.DeclareStateOutputPort("state", state)
+        self.state_names = numbered("angle", "rate", "integral", count=k)
+
+    def set_at_rest(self, context: Context, rest: RestState) -> None:
+        """Hold the tensions of a `rest` at its motor angles, in a `context`."""
+        tension = rest.tension_at_drawing_point
+        context.SetContinuousState(self._model.at_rest(rest.motor_angles, tension)[0])
+
+    def not_at_rest(self, context: Context) -> str:
+        """Return why the desired angles do not let the winches rest in a `context`, or ""."""
+        angle, tension = self._state(context)[: self._k], self._tension_port.Eval(context)
+        wanted = self._model.at_rest(angle, tension)[1]
+        error = np.abs(self._desired_port.Eval(context) - wanted)
+        if np.max(error / np.maximum(1.0, np.abs(wanted))) <= AT_REST:
+            return ""
+        return (
+            f"it is given desired motor angles up to {np.max(error):.3g} rad from those at which "
+            "it rests; what they come from has to implement set_at_rest(context, rest), and take "
+            "rest.desired_motor_angles, or motor_angles_at(X_WP) (see cdpr_drake.systems.answers)"
+        )
+
+    def residual_scale(self, context: Context) -> np.ndarray:
+        """Return 1 rad/s, the holding torque over the inertia, and the angles, in a `context`."""
+        winch, angle = self.robot.winch, self._state(context)[: self._k]
+        tension = np.abs(self._tension_port.Eval(context))
+        holding = np.maximum(winch.transmission * tension / winch.inertia, 1.0)
+        return np.concatenate([np.ones(self._k), holding, np.maximum(1.0, np.abs(angle))])
 
     def _state(self, context: Context) -> np.ndarray:
         return context.get_continuous_state_vector().CopyToVector()
