@@ -30,18 +30,18 @@ from cdpr_drake.systems import FusedPlant
 @jit
 def advance(y, steps, h, rates, noise, wrench, numbers, slopes):
     """Move y on by steps of Runge-Kutta 3 of length h, slopes (3, n) being scratch."""
-    points, constants, solid, winch, cells = numbers
+    points, constants, solid, winch, cells, filters = numbers
     for _ in range(steps):
         plant_derivatives(
-            y, rates, noise, wrench, points, constants, solid, winch, cells, slopes[0]
+            y, rates, noise, wrench, points, constants, solid, winch, cells, filters, slopes[0]
         )
         z = y + 0.5 * h * slopes[0]
         plant_derivatives(
-            z, rates, noise, wrench, points, constants, solid, winch, cells, slopes[1]
+            z, rates, noise, wrench, points, constants, solid, winch, cells, filters, slopes[1]
         )
         z = y + h * (2.0 * slopes[1] - slopes[0])
         plant_derivatives(
-            z, rates, noise, wrench, points, constants, solid, winch, cells, slopes[2]
+            z, rates, noise, wrench, points, constants, solid, winch, cells, filters, slopes[2]
         )
         y += h / 6.0 * (slopes[0] + 4.0 * slopes[1] + slopes[2])
 

@@ -81,16 +81,8 @@ class WinchDynamics(LeafSystem):
 
     def not_at_rest(self, context: Context) -> str:
         """Return why the desired angles do not let the winches rest in a `context`, or ""."""
-        angle, tension = self._state(context)[: self._k], self._tension_port.Eval(context)
-        wanted = self._model.at_rest(angle, tension)[1]
-        error = np.abs(self._desired_port.Eval(context) - wanted)
-        if np.max(error / np.maximum(1.0, np.abs(wanted))) <= AT_REST:
-            return ""
-        return (
-            f"it is given desired motor angles up to {np.max(error):.3g} rad from those at which "
-            "it rests; what they come from has to implement set_at_rest(context, rest), and take "
-            "rest.desired_motor_angles, or motor_angles_at(X_WP) (see cdpr_drake.systems.answers)"
-        )
+        desired, angle = self._desired_port.Eval(context), self._state(context)[: self._k]
+        return not_at_rest(self._model, desired, angle, self._tension_port.Eval(context))
 
     def residual_scale(self, context: Context) -> np.ndarray:
         """Return 1 rad/s, the holding torque over the inertia, and the angles, in a `context`."""
@@ -145,3 +137,25 @@ class WinchDynamics(LeafSystem):
         if self._capstan:
             tension = self._evaluate(self._state(context), np.zeros(self._k), tension)
         output.SetFromVector(tension[-self._k :])
+
+
+def not_at_rest(
+    winch: WinchModel, desired: np.ndarray, angle: np.ndarray, tension: np.ndarray
+) -> str:
+    """Return why desired angles do not let winches rest, or "".
+
+    Args:
+        winch: the winches.
+        desired: (k,) desired motor angles [rad].
+        angle: (k,) motor angles [rad].
+        tension: (k,) [N] at the drawing points.
+    """
+    wanted = winch.at_rest(angle, tension)[1]
+    error = np.abs(desired - wanted)
+    if np.max(error / np.maximum(1.0, np.abs(wanted))) <= AT_REST:
+        return ""
+    return (
+        f"it is given desired motor angles up to {np.max(error):.3g} rad from those at which it "
+        "rests; what they come from has to implement set_at_rest(context, rest), and take "
+        "rest.desired_motor_angles, or motor_angles_at(X_WP) (see cdpr_drake.systems.answers)"
+    )

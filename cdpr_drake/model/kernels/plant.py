@@ -1,8 +1,9 @@
-"""All that is continuous in the vision-based loop, in one function.
+"""All that is continuous in a control loop, in one function.
 
 The state is y = [roll, pitch, yaw, x, y, z, omega, v of the platform in W (12); motor angles (k);
-their rates (k); integrals of the angle errors (k); filters of the load cells (n_f k); desired motor
-angles (k)], SI units and radians. out: the result, of the length of the state it is of.
+their rates (k); integrals of the angle errors (k); filters of the load cells, if there are any (n_f
+k); desired motor angles, if motor rates command (k)], SI units and radians. out: the result, of the
+length of the state it is of.
 """
 
 from __future__ import annotations
@@ -59,38 +60,51 @@ def platform_derivatives(state, wrench, solid, out):
 
 
 @jit
-def plant_derivatives(y, rates, noise, wrench, points, constants, solid, winch, cells, out):
+def plant_derivatives(
+    y, command, noise, wrench, points, constants, solid, winch, cells, filters, out
+):
     """Write dy/dt and return the status of `platform_cable_forces`, or NOT_FINITE.
 
-    rates (k,): of the desired motor angles; noise (k,): of the load cells, standard normal; wrench
-    (6,): on the platform besides its cables and weight; points, constants: as in kernels/platform;
-    solid: as above; winch: as in kernels/winch; cells (5, k): gains, biases, sigmas and rates of
-    the load cells as in kernels/load_cell, and the unstrained lengths at motor angle zero.
+    command (k,): the desired motor angles, or their rates where the state holds the angles; noise
+    (k,): of the load cells, standard normal; wrench (6,): on the platform besides its cables and
+    weight; points, constants: as in kernels/platform; solid: as above; winch: as in kernels/winch;
+    cells (5, k): gains, biases, sigmas and rates of the load cells as in kernels/load_cell, and the
+    unstrained lengths at motor angle zero; filters: n_f, 0 without load cells.
     """
-    k = rates.shape[0]
-    n = y.shape[0]
+    k = command.shape[0]
+    first = 12 + 3 * k
+    last = first + filters * k
     r = float(winch[6])
     packed = np.empty(6 + 9 * k)
     winches = np.empty(5 * k)
-    length = cells[4] + r * y[12 : 12 + k]
-    status = platform_cable_forces(
-        y[:12], length, r * y[12 + k : 12 + 2 * k], points, constants, packed
-    )
+    length = np.empty(k)
+    rate = np.empty(k)
+    desired = np.empty(k)
+    total = np.empty(6)
+    integrates = last < y.shape[0]
+    size = 0.0
+    for i in range(k):
+        length[i] = float(cells[4, i]) + r * float(y[12 + i])
+        rate[i] = r * float(y[12 + k + i])
+        desired[i] = command[i]
+        if integrates:
+            desired[i] = y[last + i]
+            out[last + i] = command[i]
+            size += abs(float(command[i]))
+    status = platform_cable_forces(y[:12], length, rate, points, constants, packed)
     if status != 0:
         return status
-    platform_derivatives(y[:12], packed[:6] + wrench, solid, out[:12])
-    is_finite = winch_derivatives(y[12 : 12 + 3 * k], y[n - k :], packed[6 : 6 + k], winch, winches)
-    out[12 : 12 + 3 * k] = winches[: 3 * k]
-    first = 12 + 3 * k
-    filters = filter_derivatives(
-        y[first : n - k], winches[4 * k :], noise, cells[:4], out[first : n - k]
+    for i in range(6):
+        total[i] = float(packed[i]) + float(wrench[i])
+    platform_derivatives(y[:12], total, solid, out[:12])
+    is_finite = winch_derivatives(y[12:first], desired, packed[6 : 6 + k], winch, winches)
+    for i in range(3 * k):
+        out[12 + i] = winches[i]
+    filtered = filter_derivatives(
+        y[first:last], winches[4 * k :], noise, cells[:4], out[first:last]
     )
-    size = 0.0
     for i in range(12):
         size += abs(float(out[i]))
-    for i in range(k):
-        size += abs(float(rates[i]))
-        out[n - k + i] = rates[i]
-    if is_finite and filters and size < np.inf:
+    if is_finite and filtered and size < np.inf:
         return 0
     return NOT_FINITE
