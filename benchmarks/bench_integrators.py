@@ -20,7 +20,8 @@ import numpy as np
 from benchmarks.harness import Contestant, Report, Spread, interleave, run
 from cdpr_drake.diagrams import make_simulator
 from cdpr_drake.diagrams.simulation import INTEGRATOR, MAX_STEP
-from cdpr_drake.runs.running import Prepared, prepare, setup_of_test
+from cdpr_drake.runs.running import Prepared, prepare
+from cdpr_drake.runs.setup import setup_of_test
 
 REFERENCE_STEP = 5e-4
 
@@ -57,7 +58,7 @@ def positions(way: Way, ready: Prepared, until: float) -> tuple[np.ndarray, int]
         integrator=way.integrator,
     )
     simulator.Initialize()
-    pose, frame, rows = ready.loop.GetOutputPort("pose"), ready.setup.sample_time, []
+    pose, frame, rows = ready.loop.GetOutputPort("pose"), ready.setup.loop.timing.sample_time, []
     for n in range(1, round(until / frame) + 1):
         simulator.AdvanceTo(n * frame)
         rows.append(pose.Eval(ready.context)[3:])

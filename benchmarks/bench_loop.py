@@ -24,7 +24,8 @@ PYDRAKE = (
 TOLD = "; import time; print(time.process_time())"
 LOOP = """
 import sys, time
-from cdpr_drake.runs.running import run, setup_of_test
+from cdpr_drake.runs.running import run
+from cdpr_drake.runs.setup import setup_of_test
 setup = setup_of_test(4, gain=0.1, until=float(sys.argv[1]))
 run(setup.replace(until=1.0))
 begun = time.process_time()

@@ -24,7 +24,8 @@ from benchmarks.solve_ivp_loop import Noise, Simulation, Start
 from cdpr_drake.diagrams import simulate
 from cdpr_drake.diagrams.simulation import MAX_STEP
 from cdpr_drake.model.kernels import is_compiled
-from cdpr_drake.runs.running import Prepared, Setup, prepare, setup_of_test
+from cdpr_drake.runs.running import Prepared, prepare
+from cdpr_drake.runs.setup import Setup, setup_of_test
 
 REFERENCE_STEP = 5e-4
 MUJOCO_STEP = 1e-3
@@ -38,7 +39,7 @@ def ours(setup: Setup, record: tuple[str, ...] | None) -> Callable[[Prepared], n
     """Return our way: the diagram in Drake's simulator, in its default steps."""
 
     def simulated(ready: Prepared) -> np.ndarray:
-        every = setup.sample_time
+        every = setup.loop.timing.sample_time
         done = simulate(ready.loop, ready.context, setup.until, record=record, every=every)
         return done["pose"]
 
@@ -68,7 +69,7 @@ def measure(report: Report, options: argparse.Namespace) -> None:
     """Fill the report."""
     setup = setup_of_test(4, gain=0.1, until=options.until)
     first = prepare(setup)
-    noise = noise_of(first.loop, first.context, setup.until, first.setup.sample_time)
+    noise = noise_of(first.loop, first.context, setup.until, first.setup.loop.timing.sample_time)
     loop, start = numbers_of(setup)
     results: dict[str, np.ndarray] = {}
 
@@ -101,7 +102,7 @@ def measure(report: Report, options: argparse.Namespace) -> None:
 
         bound = FusedLoop(setup.robot, loop, MAX_STEP)
         contestants.append(entry(BOUND, lambda b: b.run(start, noise, setup.until), lambda: bound))
-        bound.run(start, noise, 2 * setup.sample_time)
+        bound.run(start, noise, 2 * setup.loop.timing.sample_time)
         finest = FusedLoop(setup.robot, loop, REFERENCE_STEP)
         reference = finest.run(start, noise, setup.until)[:, 3:]
     else:

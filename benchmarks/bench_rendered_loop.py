@@ -19,8 +19,10 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from cdpr_drake.diagrams import ImageSensing  # noqa: E402
 from cdpr_drake.diagrams.rendering import rendering_available  # noqa: E402
-from cdpr_drake.runs.running import prepare, run, setup_of_test  # noqa: E402
+from cdpr_drake.runs.running import prepare, run  # noqa: E402
+from cdpr_drake.runs.setup import setup_of_test  # noqa: E402
 
 POSITION, ORIENTATION = 10e-3, 0.5  # m, deg: the paper's accuracy
 LAST = 1.0  # s: the errors are the largest of these last
@@ -36,7 +38,7 @@ def main() -> int:
         print("Drake cannot render without a display here: EGL finds no driver")
         return 0
     given = {name: value for name, value in vars(options).items() if value is not None}
-    setup = setup_of_test(4, sensors="images", **given)
+    setup = setup_of_test(4, sensing=ImageSensing(), **given)
     start = time.process_time()
     ready = prepare(setup)
 
@@ -50,7 +52,7 @@ def main() -> int:
     errors = np.linalg.norm(record["pose_error"].reshape(-1, 2, 3), axis=2)
     last = errors[record.time >= record.time[-1] - LAST].max(axis=0)
     position, orientation = float(last[1]), float(np.degrees(last[0]))
-    frames = setup.until / (setup.sample_time or np.inf)
+    frames = setup.until / (setup.loop.timing.sample_time or np.inf)
     lost = summary.pose_frames_lost, summary.pose_images_lost, summary.tangent_frames_lost
     print(f"lambda = {setup.gain:g} 1/s, {setup.until:g} s, from {1e3 * errors[0, 1]:.0f} mm")
     print(f"largest error of the last {LAST:g} s: {1e3 * position:.1f} mm, {orientation:.2f} deg")

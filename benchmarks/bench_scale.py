@@ -29,7 +29,7 @@ from cdpr_drake.model.kernels.platform import platform_cable_forces
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.rotations import pose_to_vector
 from cdpr_drake.runs.running import run as run_setup
-from cdpr_drake.runs.running import setup_of_test
+from cdpr_drake.runs.setup import setup_of_test
 
 CABLES = (8, 16, 32, 64)
 POSE = np.array([0.02, -0.03, 0.05, -0.6, 0.4, 1.5])

@@ -11,21 +11,21 @@ from pydrake.systems.framework import Context, Diagram
 from benchmarks.solve_ivp_loop import Loop, Noise, Start
 from cdpr_drake.diagrams import blocks
 from cdpr_drake.model.equilibrium import rest_state
-from cdpr_drake.runs.running import Setup
+from cdpr_drake.runs import Setup
 
 
 def numbers_of(setup: Setup) -> tuple[Loop, Start]:
     """Return loop and start of a setup whose controller knows the robot exactly."""
-    if setup.calibrated is not None or setup.sample_time is None:
+    if setup.loop.believed is not None or setup.loop.timing.sample_time is None:
         raise ValueError("a sampled loop with exact knowledge")
     rest = rest_state(setup.robot, setup.start, setup.tensions)
     loop = Loop(
         goal_rotation=setup.goal.rotation().matrix(),
         goal_position=setup.goal.translation(),
         gain=setup.gain,
-        sample_time=setup.sample_time,
-        latency=setup.latency,
-        ramp_time=setup.ramp_time,
+        sample_time=setup.loop.timing.sample_time,
+        latency=setup.loop.timing.latency,
+        ramp_time=setup.loop.law.ramp_time,
     )
     start = Start(
         rotation=setup.start.rotation().matrix(),

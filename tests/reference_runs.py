@@ -10,8 +10,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from samples import LOOPS
 
-from cdpr_drake.runs.running import RECORD_PERIOD, run, setup_of_test
+from cdpr_drake.runs.running import run
+from cdpr_drake.runs.setup import RECORD_PERIOD, setup_of_test
 
 FILE = Path(__file__).with_name("reference_runs.npz")
 
@@ -26,7 +28,7 @@ RUNS = {
 def poses(name: str) -> np.ndarray:
     """Return the poses (n, 6) [roll, pitch, yaw, x, y, z] (rad, m) of a run, one a second."""
     test, controller, cable_model = RUNS[name]
-    setup = setup_of_test(test, controller=controller, cable_model=cable_model, noise=False)
+    setup = setup_of_test(test, loop=LOOPS[controller], cable_model=cable_model, noise=False)
     record = run(setup).record
     every = round(1.0 / RECORD_PERIOD)
     np.testing.assert_allclose(record.time[::every], np.arange(setup.until + 0.5), atol=1e-9)

@@ -8,6 +8,7 @@ import numpy as np
 from oracle import ORACLE
 from pydrake.math import RigidTransform, RotationMatrix
 
+from cdpr_drake.diagrams import JointSpaceLoop, VisionLoop
 from cdpr_drake.errors import CdprError
 from cdpr_drake.model.equilibrium import platform_balance, rest_state
 from cdpr_drake.model.robot import CableRobot
@@ -123,3 +124,7 @@ def relative_error(got: np.ndarray, expected: np.ndarray) -> float:
     got, expected = np.asarray(got, float), np.asarray(expected, float)
     assert got.shape == expected.shape, f"shape {got.shape}, expected {expected.shape}"
     return float(np.max(np.abs(got - expected)) / np.max(np.abs(expected)))
+
+
+LOOPS = {"VBC": VisionLoop(), "JSC": JointSpaceLoop()}
+"""The paper's controllers."""

@@ -42,10 +42,10 @@ def test_sensors_are_taken_away_one_kind_at_a_time(cogiro: CableRobot) -> None:
     for sensors in sensor_sets(cogiro):
         setup = ablation_setup(cogiro, sensors, 7, 0.3, 50.0)
         assert len(setup.robot.cameras.pose_cameras) == sensors.pose_cameras
-        assert setup.modelled == sensors.modelled and setup.sensors == "targets"
+        assert setup.loop.sensing.modelled == sensors.modelled
         assert setup.robot.cameras.pixel_bias_seed == setup.seed == 7
         assert setup.robot.mass == 150.0
-        assert setup.calibrated is not None and setup.calibrated.mass == 100.0
+        assert setup.loop.believed is not None and setup.loop.believed.mass == 100.0
 
 
 @pytest.mark.parametrize("name", ["cogiro", "cogiro-98m"])

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pydrake.math import RigidTransform, RotationMatrix
+from samples import LOOPS
 
 from cdpr_drake.__main__ import main
 from cdpr_drake.analysis import default_gain, gain_limit, lowest_gain
@@ -23,7 +24,7 @@ from cdpr_drake.commands.run import Plan, describe, plan
 from cdpr_drake.diagrams import make_vision_based_control
 from cdpr_drake.model.robot import CableRobot, load_robot, save_robot
 from cdpr_drake.model.servo import CUSTOMARY_GAIN
-from cdpr_drake.runs import Setup, paper_test, prepare
+from cdpr_drake.runs import Setup, make_setup, paper_test, prepare
 from cdpr_drake.runs.moves import move_near_the_middle
 from cdpr_drake.runs.running import doubt_about_gain
 from cdpr_drake.show.explorer import Explorer
@@ -100,9 +101,9 @@ def test_a_file_s_gain_wins(large: CableRobot) -> None:
         found = default_gain(large.replace(gain=gain), goal)
         assert (found.gain, found.decided_by, found.limit) == (gain, "robot file", None)
         assert found.reason() == "as the robot file says"
-    for controller in ("VBC", "JSC"):
+    for loop in LOOPS.values():
         named = large.replace(gain=0.7)
-        assert Setup(robot=named, start=start, goal=goal, controller=controller).gain == 0.7
+        assert Setup(robot=named, start=start, goal=goal, loop=loop).gain == 0.7
 
 
 def test_timing_and_law_are_heeded(large: CableRobot) -> None:
@@ -143,7 +144,7 @@ def test_where_no_gain_is_stable_the_customary_one_stands_and_is_warned_of(
     found = default_gain(cogiro, seen, believed=believed)
     assert found.gain == CUSTOMARY_GAIN and found.decided_by == "custom"
     assert found.limit is not None and found.limit.gain == 0.0
-    setup = Setup(robot=cogiro, start=goal, goal=seen, calibrated=believed)
+    setup = make_setup(robot=cogiro, start=goal, goal=seen, believed=believed)
     assert "above the limit predicted at the goal, 0/s" in doubt_about_gain(setup)
 
 
@@ -161,7 +162,7 @@ def test_a_setup_without_a_gain_chooses_one(large: CableRobot) -> None:
     assert setup.replace(until=3.0).gain == setup.gain
     assert setup.replace(until=3.0).chosen is None  # the copy was told its gain
     assert setup.replace(robot=large.replace(gain=0.01), gain=None).gain == 0.01
-    given = Setup(robot=large, start=start, goal=goal, gain=0.1)
+    given = make_setup(robot=large, start=start, goal=goal, gain=0.1)
     assert given.chosen is None and "above the limit" in doubt_about_gain(given)
     with warnings.catch_warnings():
         warnings.simplefilter("error", StabilityWarning)

@@ -89,9 +89,7 @@ def test_its_eigenvalues_are_the_loop_s(name: str) -> None:
 
 def test_with_a_wrong_calibration_too(cogiro: CableRobot) -> None:
     believed = miscalibrated(cogiro)
-    loop = make_vision_based_control(
-        cogiro, "SLSM", gain=0.01, sample_time=None, calibrated=believed
-    )
+    loop = make_vision_based_control(cogiro, "SLSM", gain=0.01, sample_time=None, believed=believed)
     gamma = gain_matrix(cogiro, believed, POSE, "SLSM")
     slow = np.sort(slow_eigenvalues(loop, POSE).real / -0.01)
     np.testing.assert_allclose(gamma.eigenvalues.real, slow, rtol=2e-4)
@@ -104,7 +102,7 @@ def test_with_a_load_cell_that_reads_nothing(cogiro: CableRobot) -> None:
     gain = np.ones(8)
     gain[2] = 1e-3
     broken = cogiro.replace(load_cells=cogiro.load_cells.replace(gain=gain))
-    loop = make_vision_based_control(broken, "ECM", gain=0.01, sample_time=None, calibrated=cogiro)
+    loop = make_vision_based_control(broken, "ECM", gain=0.01, sample_time=None, believed=cogiro)
     gamma = gain_matrix(broken, cogiro, POSE, "ECM")
     slow = np.sort(slow_eigenvalues(loop, POSE).real / -0.01)
     np.testing.assert_allclose(gamma.eigenvalues.real, slow, rtol=2e-4)

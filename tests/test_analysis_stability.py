@@ -41,9 +41,7 @@ def with_damping(robot: CableRobot, damping_time: float) -> CableRobot:
 def test_the_loop_by_hand_is_the_diagram_s(cogiro: CableRobot, latency: float, gain: float) -> None:
     """Two models with nothing in common but the cable kernel and the law."""
     believed = miscalibrated(cogiro)
-    loop = make_vision_based_control(
-        cogiro, "SLSM", gain=gain, latency=latency, calibrated=believed
-    )
+    loop = make_vision_based_control(cogiro, "SLSM", gain=gain, latency=latency, believed=believed)
     z = one_period_map(loop, equilibrium(loop, POSE)).eigenvalues
     filters = math.exp(-2.0 * math.pi * cogiro.load_cells.cutoff * 0.05)
     z = z[(np.abs(z - 1.0) > 1e-8) & (np.abs(z - filters) > 1e-6) & (np.abs(z) > 1e-2)]

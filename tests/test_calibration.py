@@ -16,7 +16,7 @@ from pydrake.math import RigidTransform
 from samples import derivative, rotation
 
 from cdpr_drake.__main__ import main
-from cdpr_drake.diagrams import make_vision_based_control
+from cdpr_drake.diagrams import TargetSensing, make_vision_based_control
 from cdpr_drake.errors import CalibrationError, RobotFileError
 from cdpr_drake.model.calibration import (
     Board,
@@ -597,7 +597,7 @@ def test_calibrate_leaves_a_robot_for_the_loop(
     errors = 1e3 * (believed.drawing_points - robot.drawing_points).ravel()
     np.testing.assert_allclose(summary["groups"]["A_i"]["errors"], errors)
 
-    loop = make_vision_based_control(robot, calibrated=believed, sensors="targets")
+    loop = make_vision_based_control(robot, believed=believed, sensing=TargetSensing())
     assert loop.GetSubsystemByName("servo") is not None
     argv = ["run", "--calibrated", "there/cogiro-calibrated.yaml", "--sensors", "targets"]
     argv += ["--controller", "vbc", "--cable-model", "SCMWE", "--until", "0.2", "--no-noise"]

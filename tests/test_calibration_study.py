@@ -77,7 +77,7 @@ def test_simulations_do_the_same(cogiro: CableRobot, test_4: Poses) -> None:
     """Whole loops, with winches, sampling and latency, against ways without dynamics."""
     believed = misjudged(cogiro, CalibrationErrors(), 0)
     setup = setup_of_test(4, noise=False, gain=0.4, until=18.0)
-    exact, wrong = (run(setup.replace(calibrated=c)) for c in (None, believed))
+    exact, wrong = (run(setup.replace(believed=c)) for c in (None, believed))
     ways = [follow(cogiro, c, *test_4) for c in (cogiro, believed)]
 
     seen = [r.record["pose_error_seen"] for r in (wrong, exact)]

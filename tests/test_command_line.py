@@ -355,7 +355,7 @@ def refusal(capsys: pytest.CaptureFixture[str], argv: list[str], status: int = 2
         (["run", "--gain", "20"], "gain * sample time = 20/s * 0.05 s = 1 must be below 1"),
         (["run", "--sample-time", "-1"], "the sample time must be positive, got -1.0 s"),
         (["run", "--sample-time", "nan"], "the sample time must be positive, got nan s"),
-        (["run", "--latency", "-1"], "the latency must be from 0 to below the run's 80 s"),
+        (["run", "--latency", "-1"], "the latency must not be negative, got -1.0 s"),
         (["run", "--until", "0"], "the time to run until must be positive and finite, got 0.0"),
         (["run", "--seed", "-1"], "the seed must be from 0 to 2^32 - 1, got -1"),
     ],
@@ -553,7 +553,9 @@ def test_without_numba_it_says_so(
 def test_the_status_of_the_process(here: Path) -> None:
     result = call("run", "--gain", "-1")
     assert result.returncode == 2 and result.stdout == ""
-    assert result.stderr == ("cdpr-drake: error: the gain must be positive and finite, got -1.0\n")
+    assert result.stderr == (
+        "cdpr-drake: error: the gain must be positive and finite, got -1.0 1/s\n"
+    )
     assert not list(here.iterdir())
 
 

@@ -55,7 +55,7 @@ def test_the_system_evaluates_the_law(cogiro: CableRobot, cable_model: str, twis
 
 
 def test_default_settings(cogiro: CableRobot) -> None:
-    assert PositionBasedVisualServo(cogiro).settings == ServoSettings()
+    assert PositionBasedVisualServo(cogiro).settings == ServoSettings(gain=0.1)
 
 
 @pytest.mark.parametrize("twist", [True, False])

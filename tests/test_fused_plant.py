@@ -9,6 +9,8 @@ import pytest
 from system_checks import feedthrough
 
 from cdpr_drake.diagrams import (
+    GaussianSensing,
+    ModelledSensing,
     blocks,
     make_vision_based_control,
     rest_context,
@@ -75,7 +77,7 @@ def both(robot: CableRobot, **options: Any) -> list[tuple[Any, Any]]:
     """Return (loop, context at rest) in blocks, and fused."""
     pairs = []
     for fused in (False, True):
-        loop = make_vision_based_control(robot, fused=fused, **{**OPTIONS, **options})
+        loop = make_vision_based_control(robot, fast=fused, **{**OPTIONS, **options})
         pairs.append((loop, rest_context(loop, POSE, seed=3)))
     return pairs
 
@@ -118,7 +120,9 @@ def test_derivatives_and_outputs_are_those_of_the_blocks(cogiro: CableRobot, var
         )
 
 
-@pytest.mark.parametrize("options", [{}, {"sample_time": None}, {"modelled": ("tensions",)}])
+@pytest.mark.parametrize(
+    "options", [{}, {"sample_time": None}, {"sensing": ModelledSensing(modelled=("tensions",))}]
+)
 def test_a_noisy_run_is_the_same(cogiro: CableRobot, options: dict[str, Any]) -> None:
     records = []
     for loop, context in both(cogiro, noise=True, gain=0.5, **options):
@@ -136,17 +140,17 @@ def test_all_outputs_but_the_acceleration_follow_from_the_state(cogiro: CableRob
     plant = FusedPlant(cogiro)
     assert feedthrough(plant) == {("external_wrench", "platform_acceleration")}
     assert plant.num_continuous_states() == 12 + 5 * 8
-    assert robot_of(make_vision_based_control(cogiro, fused=True)) is cogiro
+    assert robot_of(make_vision_based_control(cogiro, fast=True)) is cogiro
 
 
 def test_what_cannot_be_fused_is_said(cogiro: CableRobot) -> None:
     cells = cogiro.load_cells.replace(vibration_amplitude=20.0)
     with pytest.raises(ValueError, match="vibrate"):
-        make_vision_based_control(cogiro.replace(load_cells=cells), fused=True)
+        make_vision_based_control(cogiro.replace(load_cells=cells), fast=True)
     dead = Outage(sensor="load cell", number=2, reading=0.0)
     with pytest.raises(ValueError, match="fail"):
-        make_vision_based_control(cogiro, outages=(dead,), fused=True)
-    loop = make_vision_based_control(cogiro, sample_time=None, fused=True)
+        make_vision_based_control(cogiro, sensing=GaussianSensing(outages=(dead,)), fast=True)
+    loop = make_vision_based_control(cogiro, sample_time=None, fast=True)
     context = equilibrium(loop, POSE)
     model = linearize(loop, context, ["desired_pose"], ["pose"], require_equilibrium=False)
     assert model.by_differences == ("robot",)

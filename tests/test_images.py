@@ -17,7 +17,13 @@ from samples import rotation
 from system_checks import documented_ports, feedthrough, output_sizes
 
 from cdpr_drake.__main__ import main
-from cdpr_drake.diagrams import make_vision_based_control, rendering, rest_context, simulate
+from cdpr_drake.diagrams import (
+    ImageSensing,
+    make_vision_based_control,
+    rendering,
+    rest_context,
+    simulate,
+)
 from cdpr_drake.errors import GeometryError, RenderingError, RobotFileError, SimulationError
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.rotations import pose_to_vector, vector_to_pose
@@ -368,13 +374,13 @@ def test_without_a_driver_the_error_is_one_line(
 ) -> None:
     monkeypatch.setattr(rendering, "rendering_available", lambda: False)
     with pytest.raises(RenderingError, match="EGL") as caught:
-        make_vision_based_control(cogiro, sensors="images")
+        make_vision_based_control(cogiro, sensing=ImageSensing())
     assert "\n" not in str(caught.value)
     assert main(["run", "--sensors", "images", "--output", str(tmp_path / "out")]) == 2
     message = capsys.readouterr().err.strip()
     assert "EGL" in message and "\n" not in message and not (tmp_path / "out").exists()
     with pytest.raises(ValueError, match="give a sample time"):
-        make_vision_based_control(cogiro, sensors="images", sample_time=None)
+        make_vision_based_control(cogiro, sensing=ImageSensing(), sample_time=None)
 
 
 def rendered(robot: CableRobot, X_WP: RigidTransform) -> list[np.ndarray]:
@@ -450,7 +456,7 @@ def test_the_loop_arrives_on_rendered_images(cogiro: CableRobot) -> None:
     X_PM = cogiro.cameras.X_PM
     start = goal @ X_PM @ aside @ X_PM.inverse()
     loop = make_vision_based_control(
-        cogiro, "SCMWE", 1.2, noise=True, sensors="images", ramp_time=0.1
+        cogiro, "SCMWE", 1.2, noise=True, sensing=ImageSensing(), ramp_time=0.1
     )
     context = rest_context(loop, start, seed=1)
     loop.GetInputPort("desired_pose").FixValue(context, pose_to_vector(goal))

@@ -10,7 +10,8 @@ import pytest
 
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.rotations import vector_to_pose
-from cdpr_drake.runs.running import Setup, prepare, run, setup_of_test
+from cdpr_drake.runs.running import prepare, run
+from cdpr_drake.runs.setup import Setup, setup_of_test
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))  # behind what is installed
 
@@ -30,7 +31,7 @@ def prepared(**changes: object) -> tuple[Setup, Loop, Start, Noise, np.ndarray]:
     )
     setup = setup_of_test(4, loud, until=UNTIL, max_step=FINE, gain=0.1, seed=5, **changes)
     ready = prepare(setup)
-    noise = noise_of(ready.loop, ready.context, UNTIL, setup.sample_time)
+    noise = noise_of(ready.loop, ready.context, UNTIL, setup.loop.timing.sample_time)
     return setup, *numbers_of(setup), noise, run(ready).record["pose"]
 
 

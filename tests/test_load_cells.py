@@ -11,7 +11,7 @@ import pytest
 from pydrake.math import RigidTransform
 from system_checks import check_derivatives, fixed_context
 
-from cdpr_drake.diagrams import make_vision_based_control, rest_context, simulate
+from cdpr_drake.diagrams import GaussianSensing, make_vision_based_control, rest_context, simulate
 from cdpr_drake.errors import TensionError
 from cdpr_drake.model.cable_models import cable_angles
 from cdpr_drake.model.equilibrium import rest_state
@@ -317,7 +317,7 @@ def test_a_loop_reports_its_cells(cogiro: CableRobot, latency: float, noise: boo
         Outage(sensor="load cell", number=4, start=1.0),
     )
     loop = make_vision_based_control(
-        cogiro, gain=0.5, latency=latency, noise=noise, outages=outages
+        cogiro, gain=0.5, latency=latency, noise=noise, sensing=GaussianSensing(outages=outages)
     )
     context = rest_context(loop, start, seed=1)
     loop.GetInputPort("desired_pose").FixValue(context, pose_to_vector(goal))
@@ -339,7 +339,9 @@ def test_no_cable_is_torn_where_many_cells_fail(
     outages = tuple(
         Outage(sensor="load cell", number=cell, start=0.5, reading=reading) for cell in cells
     )
-    loop = make_vision_based_control(cogiro, gain=0.5, noise=True, outages=outages)
+    loop = make_vision_based_control(
+        cogiro, gain=0.5, noise=True, sensing=GaussianSensing(outages=outages)
+    )
     context = rest_context(loop, start, seed=2)
     loop.GetInputPort("desired_pose").FixValue(context, pose_to_vector(goal))
     record = simulate(loop, context, 12.0, record=["tension_at_winch", "pose_error"])

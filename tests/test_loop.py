@@ -16,7 +16,6 @@ from cdpr_drake.diagrams import (
     make_vision_based_control,
     rest_context,
     simulate,
-    with_reference,
 )
 from cdpr_drake.model.catenary import cable_energy, elastic_catenary
 from cdpr_drake.model.kernels import is_compiled
@@ -85,7 +84,7 @@ def test_joint_space_control_ends_low(cogiro: CableRobot) -> None:
     """Its lengths know no stretch: the platform ends tens of millimetres under the goal."""
     start, goal = paper_test(4).poses(cogiro)
     reference = ExponentialApproach(cogiro, start, goal, gain=0.4)
-    loop = with_reference(make_joint_space_control(cogiro), reference)
+    loop = make_joint_space_control(cogiro, reference=reference)
     context = rest_context(loop, start)
     end = simulate(loop, context, 40.0, record=["pose"], every=1.0)["pose"][-1]
     low = goal.translation() - end[3:]
@@ -229,7 +228,7 @@ def test_energy_balances(cogiro: CableRobot, friction: bool) -> None:
     start = RigidTransform(RollPitchYaw([0.02, 0.0, 0.1]), [0.3, -0.2, 0.8])
     goal = RigidTransform(RollPitchYaw([0.0, 0.1, -0.1]), [-0.5, 0.3, 1.8])
     reference = ExponentialApproach(robot, start, goal, gain=1.0, ramp_time=0.5)
-    loop = with_reference(make_joint_space_control(robot, cable_model="ECM"), reference)
+    loop = make_joint_space_control(robot, cable_model="ECM", reference=reference)
     wrench = np.array([5.0, -8.0, 6.0, 40.0, 60.0, -30.0])
     diagram = metered(robot, loop, wrench)
     context = rest_context(diagram, start)

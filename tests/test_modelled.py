@@ -10,7 +10,14 @@ from system_checks import documented_ports, feedthrough, input_sizes, output_siz
 
 from cdpr_drake.analysis import comparable_pose, gain_matrix
 from cdpr_drake.analysis.modelled_gain import modelled_gain_matrix
-from cdpr_drake.diagrams import blocks, make_vision_based_control, rest_context, simulate
+from cdpr_drake.diagrams import (
+    ModelledSensing,
+    blocks,
+    make_vision_based_control,
+    rest_context,
+    simulate,
+)
+from cdpr_drake.diagrams.sensing import sensing_called
 from cdpr_drake.errors import SimulationError
 from cdpr_drake.model.equilibrium import rest_state
 from cdpr_drake.model.kinematics import cable_geometry
@@ -90,7 +97,9 @@ BOTH = ("tensions", "tangents")
 def test_the_loop_has_the_model_instead_of_the_sensor(
     cogiro: CableRobot, sensors: str, modelled: tuple[str, ...]
 ) -> None:
-    loop = make_vision_based_control(cogiro, sensors=sensors, modelled=modelled)
+    loop = make_vision_based_control(
+        cogiro, sensing=ModelledSensing(modelled=modelled, cameras=sensing_called(sensors))
+    )
     names = {path[-1] for path, _ in blocks(loop)}
     assert ("load_cells" in names) != ("tension_model" in names)
     assert ("tangent_cameras" in names) != ("tangent_model" in names)
@@ -105,12 +114,14 @@ def test_the_loop_has_the_model_instead_of_the_sensor(
 @pytest.mark.parametrize("modelled", [("tension",), ("tangents", "tangents")])
 def test_what_cannot_be_modelled_is_refused(cogiro: CableRobot, modelled: tuple[str, ...]) -> None:
     with pytest.raises(ValueError, match="known are tensions, tangents"):
-        make_vision_based_control(cogiro, modelled=modelled)
+        ModelledSensing(modelled=modelled)
 
 
 @pytest.mark.needs("numba")
 def test_test_4_arrives_without_load_cells_and_tangent_cameras() -> None:
-    summary = run(setup_of_test(4, gain=0.5, until=14.0, noise=False, modelled=BOTH)).summary
+    summary = run(
+        setup_of_test(4, gain=0.5, until=14.0, noise=False, sensing=ModelledSensing())
+    ).summary
     assert summary.position_error < 3.0 and summary.orientation_error < 0.05
     assert not summary.slack_cables
 
@@ -118,7 +129,7 @@ def test_test_4_arrives_without_load_cells_and_tangent_cameras() -> None:
 @pytest.mark.needs("numba")
 def test_a_continuous_loop_takes_the_model_too() -> None:
     setup = setup_of_test(4, gain=0.4, until=0.5, noise=False, sample_time=None)
-    with_model, with_sensors = run(setup.replace(modelled=BOTH)), run(setup)
+    with_model, with_sensors = run(setup.replace(sensing=ModelledSensing())), run(setup)
     apart = with_model.record["pose"] - with_sensors.record["pose"]
     assert 0.0 < np.abs(apart).max() < 1e-4
 

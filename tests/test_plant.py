@@ -20,7 +20,6 @@ from cdpr_drake.diagrams import (
     make_simulator,
     rest_context,
     simulate,
-    with_reference,
 )
 from cdpr_drake.diagrams.robot import ROBOT_OUTPUTS, make_plant
 from cdpr_drake.model.robot import CableRobot, load_robot
@@ -28,7 +27,7 @@ from cdpr_drake.model.rotations import vector_to_pose
 from cdpr_drake.model.vision.outages import Outage
 from cdpr_drake.study import linearize
 from cdpr_drake.study.names import continuous_state_names
-from cdpr_drake.systems import ExponentialApproach, FusedPlant, InverseKinematicsAngles
+from cdpr_drake.systems import ExponentialApproach, FusedPlant
 from cdpr_drake.systems.fused_plant import fused_refusal
 
 EXTRA = ("state", "packed", "platform_wrench")
@@ -340,23 +339,11 @@ def test_the_robot_has_the_blocks_and_ports_it_had(cogiro: CableRobot) -> None:
 def test_joint_space_control_of_the_fused_plant_is_that_of_the_blocks(cogiro: CableRobot) -> None:
     start = vector_to_pose(POSE)
     goal = RigidTransform(RollPitchYaw(0.0, 0.0, 0.1), [-0.6, 0.2, 1.6])
-    builder = DiagramBuilder()
-    plant = builder.AddNamedSystem("robot", FusedPlant(cogiro, command=COMMANDS[1]))
-    inverse = builder.AddNamedSystem("inverse_kinematics", InverseKinematicsAngles(cogiro))
-    builder.Connect(inverse.get_output_port(), plant.GetInputPort("desired_motor_angles"))
-    builder.ExportInput(inverse.get_input_port(), "desired_pose")
-    for name in ("pose", "tension_at_drawing_point", "motor_torques"):
-        builder.ExportOutput(plant.GetOutputPort(name), name)
     runs = []
-    blocks = make_joint_space_control(cogiro)
-    rest = rest_context(blocks, start).get_continuous_state_vector().CopyToVector()
-    for loop in (blocks, builder.Build()):
-        moving = with_reference(loop, ExponentialApproach(cogiro, start, goal, 0.5))
-        context = moving.CreateDefaultContext()
-        state = context.get_continuous_state_vector().CopyToVector()
-        state[: rest.size] = rest  # load cells come after, for those that have them
-        context.SetContinuousState(state)
-        runs.append(simulate(moving, context, 1.0))
+    for fast in (False, True):
+        reference = ExponentialApproach(cogiro, start, goal, 0.5)
+        moving = make_joint_space_control(cogiro, reference=reference, fast=fast)
+        runs.append(simulate(moving, rest_context(moving, start), 1.0))
     in_blocks, fused = runs
     assert np.ptp(in_blocks["pose"][:, 5]) > 0.03
     np.testing.assert_allclose(fused["pose"], in_blocks["pose"], rtol=0.0, atol=1e-9)

@@ -11,7 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from pydrake.math import RigidTransform
+from samples import LOOPS
 
+from cdpr_drake.diagrams import JointSpaceLoop, TargetSensing
+from cdpr_drake.diagrams.sensing import sensing_called
 from cdpr_drake.errors import GeometryError, TensionError
 from cdpr_drake.model.robot import CableRobot, load_robot, robot_names
 from cdpr_drake.model.rotations import log_rotation
@@ -145,14 +148,13 @@ def test_no_component_overshoots_by_more_than_the_excursion(error: np.ndarray) -
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"controller": "PID"}, 'unknown controller "PID"; known are VBC, JSC'),
         ({"cable_model": "ABC"}, 'unknown cable model "ABC"; known are ECM, CMWE, SCMWE, SLSM'),
         ({"gain": 0.0}, "the gain must be positive"),
         ({"gain": np.nan}, "the gain must be positive and finite"),
         ({"until": np.inf}, "the time to run until must be positive and finite"),
         ({"until": 0.01}, "a run takes at least 0.05 s"),
         ({"max_step": -0.01}, "the integrator's step must be positive"),
-        ({"latency": -0.01}, "the latency must be from 0 to below the run's 80 s"),
+        ({"latency": -0.01}, "the latency must not be negative, got -0.01 s"),
         ({"latency": 80.0}, "the latency must be from 0 to below the run's 80 s"),
         ({"ramp_time": -1.0}, "the ramp time must not be negative"),
         ({"seed": -1}, "the seed must be from 0"),
@@ -186,7 +188,7 @@ def test_what_cannot_work_is_refused_before_the_first_step(
 def test_joint_space_control_is_asked_for_the_whole_way(robot: CableRobot) -> None:
     """Between two poses it can hold there is one where least-norm tensions would push."""
     start, goal = [0, 0, 0, -3.0, 0, 4.2], [0, 0, np.radians(100), 3.0, 0, 4.2]
-    setup = Setup(robot=robot, start=start, goal=goal, controller="JSC")
+    setup = Setup(robot=robot, start=start, goal=goal, loop=JointSpaceLoop())
     with pytest.raises(TensionError, match=r"joint space control at t = [\d.]+ s"):
         prepare(setup)
 
@@ -203,7 +205,7 @@ def test_a_goal_beyond_the_largest_tension_is_refused(robot: CableRobot) -> None
 def test_every_built_in_robot_can_make_the_short_move(name: str, controller: str) -> None:
     robot = load_robot(name)
     start, goal = move_near_the_middle(robot)
-    prepare(Setup(robot=robot, start=start, goal=goal, controller=controller))
+    prepare(Setup(robot=robot, start=start, goal=goal, loop=LOOPS[controller]))
 
 
 # --- runs
@@ -223,8 +225,8 @@ def test_the_error_falls_at_the_gain_sped_up_by_the_delay(quick: Run) -> None:
     """With ds/dt = -lambda s(t - d) the rate is sigma = lambda exp(sigma d), 3 % more here."""
     time, error = quick.record.time, quick.record["pose_error"]
     size = np.linalg.norm(error[:, 3:], axis=1)
-    assert quick.setup.sample_time is not None
-    delay = quick.setup.latency + 0.5 * quick.setup.sample_time
+    assert quick.setup.loop.timing.sample_time is not None
+    delay = quick.setup.loop.timing.latency + 0.5 * quick.setup.loop.timing.sample_time
     expected = 0.5
     for _ in range(20):
         expected = 0.5 * np.exp(expected * delay)
@@ -285,7 +287,7 @@ def test_a_continuous_loop_runs_too() -> None:
 def test_a_wrong_calibration_is_not_seen(robot: CableRobot) -> None:
     X_WF = RigidTransform([0.0, 0.0, 0.01]) @ robot.cameras.X_WF
     believed = robot.replace(cameras=robot.cameras.replace(X_WF=X_WF))
-    summary = run(setup_of_test(4, gain=0.5, until=16.0, noise=False, calibrated=believed)).summary
+    summary = run(setup_of_test(4, gain=0.5, until=16.0, noise=False, believed=believed)).summary
     assert summary.position_error_seen is not None and summary.position_error_seen < 1.5
     assert summary.offset == pytest.approx((0.0, 0.0, -10.0), abs=1.5)
 
@@ -294,7 +296,7 @@ def test_a_wrong_calibration_is_not_seen(robot: CableRobot) -> None:
 def lifts() -> dict[str, Run]:
     """Test 3, a lift of 1 m, hurried, by both controllers without noise."""
     return {
-        controller: run(setup_of_test(3, gain=0.3, until=25.0, noise=False, controller=controller))
+        controller: run(setup_of_test(3, gain=0.3, until=25.0, noise=False, loop=LOOPS[controller]))
         for controller in ("VBC", "JSC")
     }
 
@@ -324,7 +326,7 @@ def test_joint_space_control_sees_nothing_and_is_judged_by_the_goal(lifts: dict[
 def test_labels_tell_runs_apart() -> None:
     setup = setup_of_test(4)
     labels = [
-        setup.replace(controller=c, cable_model=m).label
+        setup.replace(loop=LOOPS[c], cable_model=m, gain=0.1).label
         for c, m in (("VBC", "SCMWE"), ("VBC", "SLSM"), ("JSC", "SCMWE"), ("JSC", "ECM"))
     ]
     assert labels == ["VBC SCMWE", "VBC SLSM", "JSC", "JSC ECM"]
@@ -364,7 +366,7 @@ def test_the_summary_counts_what_cameras_lost(
     sensor: str, number: int | None, frames: int, images: int, tangents: tuple[int, ...]
 ) -> None:
     outage = Outage(sensor=sensor, number=number, start=0.5, end=1.5)
-    result = run(setup_of_test(4, gain=0.3, until=2.0, sensors="targets", outages=(outage,)))
+    result = run(setup_of_test(4, gain=0.3, until=2.0, sensing=TargetSensing(outages=(outage,))))
     summary = result.summary
     assert summary.pose_frames_lost == frames
     assert summary.pose_images_lost == images
@@ -374,7 +376,7 @@ def test_the_summary_counts_what_cameras_lost(
     assert summary.lowest_tension > 50.0 and summary.highest_tension < 700.0
 
 
-@pytest.mark.parametrize("changes", [{}, {"controller": "JSC"}])
+@pytest.mark.parametrize("changes", [{}, {"loop": JointSpaceLoop()}])
 def test_where_nothing_is_seen_nothing_is_lost(changes: dict[str, Any]) -> None:
     summary = short_run(**changes).summary
     assert summary.pose_frames_lost is summary.pose_images_lost is None
@@ -383,12 +385,13 @@ def test_where_nothing_is_seen_nothing_is_lost(changes: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "message"),
+    ("given", "message"),
     [
-        ({"sensors": "sonar"}, 'unknown sensors "sonar"; known are gaussian, targets'),
-        ({"estimator": "best"}, 'unknown estimator "best"; known are joint, mean'),
+        (("sonar",), 'unknown sensors "sonar"; known are gaussian, targets'),
+        (("targets", "best"), 'unknown estimator "best"; known are joint, mean'),
+        (("gaussian", "joint"), "an estimator means nothing"),
     ],
 )
-def test_unknown_sensors_are_refused(changes: dict[str, Any], message: str) -> None:
+def test_unknown_sensors_are_refused(given: tuple[str, ...], message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        setup_of_test(4, **changes)
+        sensing_called(*given)

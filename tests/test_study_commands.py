@@ -13,7 +13,7 @@ import pytest
 from cdpr_drake.__main__ import main
 from cdpr_drake.analysis import StabilityWarning, comparable_pose, gain_limit, gain_matrix
 from cdpr_drake.commands.terminal import counted
-from cdpr_drake.diagrams import make_vision_based_control
+from cdpr_drake.diagrams import JointSpaceLoop, make_vision_based_control
 from cdpr_drake.model.robot import load_robot
 from cdpr_drake.runs import Setup, prepare, setup_of_test
 from cdpr_drake.runs.running import doubt_about_gain
@@ -193,7 +193,8 @@ def high_gain(**changes: Any) -> Setup:
 
 def test_a_run_above_the_predicted_limit_warns() -> None:
     test = high_gain()
-    limit = gain_limit(test.robot, test.goal, test.latency, test.sample_time or 0.0)
+    timing = test.loop.timing
+    limit = gain_limit(test.robot, test.goal, timing.latency, timing.sample_time or 0.0)
     assert doubt_about_gain(high_gain(gain=0.98 * limit.gain)) == ""
     above = high_gain(gain=1.02 * limit.gain)
     with pytest.warns(StabilityWarning, match=f"{limit.gain:.3g}/s, where {limit.mode} goes"):
@@ -223,7 +224,7 @@ def test_what_cannot_be_predicted_is_told() -> None:
 def test_joint_space_control_is_not_in_doubt() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert doubt_about_gain(high_gain(controller="JSC", gain=3.0)) == ""
+        assert doubt_about_gain(high_gain(loop=JointSpaceLoop(), gain=3.0)) == ""
 
 
 def test_the_command_line_warns_on_one_line(capsys: pytest.CaptureFixture[str]) -> None:

@@ -73,7 +73,7 @@ def test_the_tensions_are_those_of_the_rule(cogiro: CableRobot) -> None:
 
 def test_the_controller_sees_no_error_though_its_calibration_is_wrong(cogiro: CableRobot) -> None:
     believed = miscalibrated(cogiro)
-    diagram = make_vision_based_control(cogiro, calibrated=believed)
+    diagram = make_vision_based_control(cogiro, believed=believed)
     context = equilibrium(diagram, POSE)
     seen = diagram.GetOutputPort("pose_error_seen").Eval(context)
     true = diagram.GetOutputPort("pose_error").Eval(context)
@@ -124,7 +124,7 @@ def changed(diagram: Any, block: str, entry: int, by: float) -> Any:
         # 1 % of the holding torque too much
         ("robot/winches/integral[3]", None, "robot/winches/rate[3]", 0.01),
         # 1 % of the reading
-        ("load_cells/tension[2]", None, "load_cells/tension[2]", 0.01),
+        ("robot/load_cells/tension[2]", None, "robot/load_cells/tension[2]", 0.01),
     ],
 )
 def test_residuals_are_relative_to_the_largest_term(

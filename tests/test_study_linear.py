@@ -30,7 +30,6 @@ from cdpr_drake.diagrams import (
     make_joint_space_control,
     make_vision_based_control,
     rest_context,
-    with_reference,
 )
 from cdpr_drake.errors import LinearizationError
 from cdpr_drake.model.robot import CableRobot
@@ -158,8 +157,8 @@ def test_each_state_has_the_name_of_its_place(cogiro: CableRobot) -> None:
     plant.SetPositions(at("robot", "platform"), np.arange(1.0, 7.0))
     plant.SetVelocities(at("robot", "platform"), np.arange(7.0, 13.0))
     at("robot", "winches").SetContinuousState(np.arange(100.0, 124.0))
-    at("load_cells").SetContinuousState(np.arange(200.0, 208.0))
-    at("integrator").SetContinuousState(np.arange(300.0, 308.0))
+    at("robot", "load_cells").SetContinuousState(np.arange(200.0, 208.0))
+    at("robot", "integrator").SetContinuousState(np.arange(300.0, 308.0))
     x = dict(zip(names, context.get_continuous_state_vector().CopyToVector(), strict=True))
     assert [x[f"robot/platform/{c}"] for c in ("roll", "pitch", "yaw", "x", "y", "z")] == [
         1, 2, 3, 4, 5, 6
@@ -167,7 +166,7 @@ def test_each_state_has_the_name_of_its_place(cogiro: CableRobot) -> None:
     assert x["robot/platform/omega_x"] == 7.0 and x["robot/platform/v_z"] == 12.0
     assert x["robot/winches/angle[3]"] == 102.0
     assert x["robot/winches/rate[1]"] == 108.0 and x["robot/winches/integral[8]"] == 123.0
-    assert x["load_cells/tension[8]"] == 207.0 and x["integrator/angle[1]"] == 300.0
+    assert x["robot/load_cells/tension[8]"] == 207.0 and x["robot/integrator/angle[1]"] == 300.0
 
 
 def test_each_discrete_state_has_the_name_of_its_place(cogiro: CableRobot) -> None:
@@ -379,7 +378,9 @@ def test_off_equilibrium_warns_raises_or_is_silent_as_asked(loop: tuple[Any, Any
     context = diagram.CreateDefaultContext()
     context.SetTimeStateAndParametersFrom(rest)
     diagram.GetInputPort("desired_pose").FixValue(context, np.add(POSE, [0, 0, 0, 0.1, 0, 0]))
-    with pytest.warns(LinearizationWarning, match="not an equilibrium: d/dt integrator/angle"):
+    with pytest.warns(
+        LinearizationWarning, match="not an equilibrium: d/dt robot/integrator/angle"
+    ):
         linearize(diagram, context, [], [])
     with pytest.raises(LinearizationError, match="not an equilibrium"):
         linearize(diagram, context, [], [], require_equilibrium=True)
@@ -403,15 +404,13 @@ def test_a_gain_on_its_ramp_is_warned_of(cogiro: CableRobot, loop: tuple[Any, An
 
 def test_a_moving_reference_is_frozen(cogiro: CableRobot) -> None:
     start = np.add(POSE, [0, 0, 0, 0.5, 0, 0])
-    diagram = with_reference(
-        make_vision_based_control(cogiro, sample_time=None),
-        ExponentialApproach(cogiro, start, POSE),
-    )
+    reference = ExponentialApproach(cogiro, start, POSE)
+    diagram = make_vision_based_control(cogiro, sample_time=None, reference=reference)
     context = rest_context(diagram, start)
     context.SetTime(5.0)
     model = linearize(diagram, context, [], ["pose_error"], require_equilibrium=False)
     assert model.time == 5.0 and model.A.shape == (52, 52)
-    assert "loop/robot/platform/x" in model.states
+    assert "robot/platform/x" in model.states
 
 
 def test_a_diagram_is_converted_once(loop: tuple[Any, Any]) -> None:

@@ -125,7 +125,7 @@ def test_the_difference_is_the_integrator_s(cogiro: CableRobot) -> None:
 
 
 def test_with_a_wrong_calibration_too(cogiro: CableRobot) -> None:
-    loop = make_vision_based_control(cogiro, "SLSM", gain=1.0, calibrated=miscalibrated(cogiro))
+    loop = make_vision_based_control(cogiro, "SLSM", gain=1.0, believed=miscalibrated(cogiro))
     context = equilibrium(loop, POSE)
     found = one_period_map(loop, context, require_equilibrium=True).matrix
     assert np.abs(extrapolated(loop, context) - found).max() <= 1e-6 * np.abs(found).max()

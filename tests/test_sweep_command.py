@@ -41,7 +41,7 @@ def test_each_case_is_drawn_from_its_seed() -> None:
     setup, values = drawn[7]
     assert setup.robot.payload.mass == values["payload"] and setup.gain == values["gain"]
     again, _ = draw(base, 7, **spread)
-    assert again.seed == setup.seed and again.calibrated == setup.calibrated
+    assert again.seed == setup.seed and again.loop.believed == setup.loop.believed
     assert len({s.seed for s, _ in drawn}) == 200
 
 
@@ -50,17 +50,17 @@ def test_drawing_one_thing_more_leaves_the_others_as_they_are() -> None:
     plain, nothing = draw(base, 5)
     heavier, drawn = draw(base, 5, payloads=(10.0, 20.0))
     assert nothing == {} and set(drawn) == {"payload"}
-    assert heavier.seed == plain.seed and plain.calibrated is not None
-    assert heavier.calibrated is not None
+    assert heavier.seed == plain.seed and plain.loop.believed is not None
+    assert heavier.loop.believed is not None
     np.testing.assert_array_equal(
-        heavier.calibrated.drawing_points, plain.calibrated.drawing_points
+        heavier.loop.believed.drawing_points, plain.loop.believed.drawing_points
     )
     exact, _ = draw(base, 5, calibration=0.0)
-    assert exact.calibrated is None
+    assert exact.loop.believed is None
     twice, _ = draw(base, 5, calibration=2.0)
-    assert twice.calibrated is not None
-    shift = plain.calibrated.drawing_points - plain.robot.drawing_points
-    double = twice.calibrated.drawing_points - plain.robot.drawing_points
+    assert twice.loop.believed is not None
+    shift = plain.loop.believed.drawing_points - plain.robot.drawing_points
+    double = twice.loop.believed.drawing_points - plain.robot.drawing_points
     np.testing.assert_allclose(double, 2.0 * shift, atol=1e-14)
 
 

@@ -42,12 +42,12 @@ MAKE: dict[str, tuple[Callable[[CableRobot], LeafSystem], tuple[str, ...]]] = {
     "WinchDynamics": (lambda r: systems.WinchDynamics(r), ("robot",)),
     "CameraMeasurement": (
         lambda r: systems.CameraMeasurement(r, misplaced(r)),
-        ("robot", "calibrated"),
+        ("robot", "believed"),
     ),
     "CableTangentCameras": (lambda r: systems.CableTangentCameras(r), ("robot",)),
     "LoadCellFilter": (
         lambda r: systems.LoadCellFilter(r, misplaced(r)),
-        ("robot", "calibrated", "outages"),
+        ("robot", "believed", "outages"),
     ),
     "PlausibleTension": (lambda r: systems.PlausibleTension(r), ("robot", "sample_time")),
     "PositionBasedVisualServo": (

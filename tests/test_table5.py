@@ -51,7 +51,7 @@ def test_intervals_hold_the_true_median_as_often_as_they_say():
 def short_run():
     setup = setup_of_test(4, until=12.0, max_step=table5_work.MAX_STEP, seed=2)
     eyes = Eyes(setup.robot, 2, setup_from({"calibration_poses": 4, "calibration_turn": 4.0}))
-    return run(setup.replace(calibrated=eyes.believed_at(setup.goal)))
+    return run(setup.replace(believed=eyes.believed_at(setup.goal)))
 
 
 def test_noise_aside_the_error_is_what_the_controller_sees(short_run):

@@ -18,7 +18,8 @@ from system_checks import (
 )
 from test_vision_tangents import angles, cables_at
 
-from cdpr_drake.diagrams import make_vision_based_control, rest_context, simulate
+from cdpr_drake.diagrams import TargetSensing, make_vision_based_control, rest_context, simulate
+from cdpr_drake.diagrams.sensing import sensing_called
 from cdpr_drake.errors import GeometryError, RobotFileError, SimulationError
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import pose_to_vector
@@ -289,7 +290,7 @@ def test_an_outage_says_what_is_wrong_with_it() -> None:
 def closed_loop(robot: CableRobot, gain: float = 0.3, **options: Any) -> tuple[Diagram, Any]:
     """Test 4 on targets, tangents and load cells, at rest at its start."""
     start, goal = paper_test(4).poses(robot)
-    options = {"noise": True, "sensors": "targets"} | options
+    options = {"noise": True, "sensing": TargetSensing()} | options
     loop = make_vision_based_control(robot, "SCMWE", gain, **options)
     context = rest_context(loop, start, seed=1)
     loop.GetInputPort("desired_pose").FixValue(context, pose_to_vector(goal))
@@ -304,16 +305,16 @@ def final_errors(s: np.ndarray) -> tuple[float, float]:
 
 def test_sensors_that_cannot_be_are_refused(cogiro: CableRobot) -> None:
     with pytest.raises(ValueError, match='unknown sensors "sonar"'):
-        make_vision_based_control(cogiro, sensors="sonar")
+        sensing_called("sonar")
     with pytest.raises(ValueError, match="give a sample time"):
-        make_vision_based_control(cogiro, sensors="targets", sample_time=None)
+        make_vision_based_control(cogiro, sensing=TargetSensing(), sample_time=None)
     with pytest.raises(ValueError, match="latency must be above 0"):
-        make_vision_based_control(cogiro, sensors="targets", latency=0.0)
+        make_vision_based_control(cogiro, sensing=TargetSensing(), latency=0.0)
     with pytest.raises(ValueError, match='unknown estimator "best"'):
-        make_vision_based_control(cogiro, sensors="targets", estimator="best")
+        make_vision_based_control(cogiro, sensing=TargetSensing(estimator="best"))
     blind = cogiro.replace(cameras=cogiro.cameras.replace(stereo_pairs=()))
     with pytest.raises(RobotFileError, match="no pair sees cable 1"):
-        make_vision_based_control(blind, sensors="targets")
+        make_vision_based_control(blind, sensing=TargetSensing())
 
 
 @pytest.mark.parametrize("latency", [0.02, 0.05, 0.07, 0.10, 0.13])
@@ -322,7 +323,9 @@ def test_the_latency_is_counted_once(cogiro: CableRobot, latency: float) -> None
     robot = unbiased(cogiro)
     records = []
     for sensors in ("targets", "gaussian"):
-        loop, context = closed_loop(robot, latency=latency, noise=False, sensors=sensors)
+        loop, context = closed_loop(
+            robot, latency=latency, noise=False, sensing=sensing_called(sensors)
+        )
         records.append(simulate(loop, context, 1.0, every=0.01, record=["commanded_motor_rates"]))
     rates, expected = (r["commanded_motor_rates"] for r in records)
     assert np.abs(expected).max() > 5.0
@@ -344,7 +347,7 @@ def test_at_rest_nothing_moves(cogiro: CableRobot, latency: float) -> None:
 @pytest.mark.parametrize("estimator", ["joint", "mean"])
 def test_test_4_arrives_on_noisy_targets(cogiro: CableRobot, estimator: str) -> None:
     """White noise averages out in the loop: 5 mm and 0.1 degrees with either estimate."""
-    loop, context = closed_loop(unbiased(cogiro), estimator=estimator)
+    loop, context = closed_loop(unbiased(cogiro), sensing=TargetSensing(estimator=estimator))
     s = simulate(loop, context, 25.0, record=["pose_error"])["pose_error"]
     position, orientation = final_errors(s)
     assert np.linalg.norm(s[0, 3:]) > 1.7
@@ -357,7 +360,7 @@ def test_a_fixed_bias_of_the_targets_does_not_average_out(
     cogiro: CableRobot, estimator: str, degrees: float
 ) -> None:
     """A quarter of a pixel in every point still leaves 5 mm, but more than 0.1 degrees."""
-    loop, context = closed_loop(cogiro, estimator=estimator)
+    loop, context = closed_loop(cogiro, sensing=TargetSensing(estimator=estimator))
     s = simulate(loop, context, 25.0, record=["pose_error"])["pose_error"]
     position, orientation = final_errors(s)
     assert position <= 5e-3 and 0.1 < orientation < degrees
@@ -378,7 +381,7 @@ def test_a_fixed_bias_of_the_targets_does_not_average_out(
     ids=lambda o: f"{o.sensor} {o.number or 'all'}{'' if o.reading is None else ' dead'}",
 )
 def test_a_lost_sensor_leaves_the_loop_stable(cogiro: CableRobot, lost: Outage) -> None:
-    loop, context = closed_loop(unbiased(cogiro), 0.5, outages=(lost,))
+    loop, context = closed_loop(unbiased(cogiro), 0.5, sensing=TargetSensing(outages=(lost,)))
     names = ["pose_error", "frames_lost", "tension_at_drawing_point"]
     record = simulate(loop, context, 16.0, record=names)
     position, orientation = final_errors(record["pose_error"])

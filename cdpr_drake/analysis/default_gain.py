@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analysis.stability import LOWEST_GAIN, GainLimit, SampledServo, find_gain_limit
-from cdpr_drake.diagrams.control import check_sampling
+from cdpr_drake.diagrams.timing import Timing
 from cdpr_drake.diagrams.watch import LimitWatch
 from cdpr_drake.errors import CdprError, PredictionError
 from cdpr_drake.model.robot import CableRobot
@@ -180,7 +180,7 @@ def predicted_limit(
         raise ValueError(f"{believed.num_cables} cables in the robot believed, {k} in the true one")
     period = NEARLY_CONTINUOUS if sample_time is None else sample_time
     delay = 0.0 if sample_time is None else latency
-    check_sampling(0.0, period, delay)
+    Timing(sample_time=period, latency=delay)  # refuses what is out of range
     if delay > MOST_FRAMES_LATE * period:
         raise PredictionError(f"the latency is above {MOST_FRAMES_LATE} frames")
     servo = SampledServo(

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analysis.gain_matrix import target_twist
-from cdpr_drake.diagrams.control import check_modelled
+from cdpr_drake.diagrams import ModelledSensing
 from cdpr_drake.model.equilibrium import rest_state
 from cdpr_drake.model.modelled import modelled_tangents, modelled_tensions
 from cdpr_drake.model.rest_model import rest_model
@@ -39,7 +39,7 @@ def modelled_gain_matrix(
         GeometryError, TensionError, EquilibriumError: the robot cannot rest there.
         ValueError: what cannot be modelled.
     """
-    check_modelled(modelled)
+    ModelledSensing(modelled=modelled)  # refuses what cannot be modelled
     X_WP, k = as_pose(pose), robot.num_cables
     model = rest_model(robot, rest_state(robot, X_WP))
     tension, tangents = model.rest.tension_at_drawing_point, model.tangents

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analysis.gain_matrix import gain_matrix, target_twist
-from cdpr_drake.diagrams.control import check_sampling, split_latency
+from cdpr_drake.diagrams.timing import Timing
 from cdpr_drake.model.camera import true_from_seen
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.servo import ServoSettings
@@ -76,7 +76,7 @@ class SampledServo:
         settings: ServoSettings | None = None,
         drag: float = 0.0,
     ) -> None:
-        check_sampling(0.0, sample_time, 0.0)
+        Timing(sample_time=sample_time)  # refuses what is out of range
         ours = believed if believed is not None else robot
         gamma = gain_matrix(robot, ours, pose, cable_model, tensions=tensions, settings=settings)
         self.gamma = gamma
@@ -112,7 +112,7 @@ class SampledServo:
             gain: lambda [1/s].
             latency: [s].
         """
-        frames, phase = split_latency(self.sample_time, latency)
+        frames, phase = Timing(sample_time=self.sample_time, latency=latency).split()
         n = self._size
         size = n + 6 + 6 * frames
         u, seen = slice(n, n + 6), np.arange(n + 6, size)
@@ -223,7 +223,7 @@ def gain_limit(
         GeometryError, TensionError, EquilibriumError: the robot cannot rest there.
         ValueError: a time out of range, an unknown cable model or rule.
     """
-    check_sampling(0.0, sample_time, latency)
+    Timing(sample_time=sample_time, latency=latency)  # refuses what is out of range
     servo = SampledServo(robot, pose, sample_time, **law)
     return find_gain_limit(servo, latency, highest=highest, points=points)
 
@@ -408,7 +408,7 @@ def stability_map(
         ValueError: a time out of range, an unknown cable model or rule.
     """
     columns, rows = np.array([*gains], float), np.array([*latencies], float)
-    check_sampling(0.0, sample_time, float(rows.min(initial=0.0)))
+    Timing(sample_time=sample_time, latency=float(rows.min(initial=0.0)))
     servo = SampledServo(robot, pose, sample_time, **law)
     worst = np.array([[servo.growth(gain, latency) for gain in columns] for latency in rows])
     top = float(columns.max())

@@ -17,10 +17,12 @@ import numpy as np
 
 from cdpr_drake.analysis import DefaultGain, default_gain
 from cdpr_drake.batch import Outcome, sweep
+from cdpr_drake.diagrams import ModelledSensing, TargetSensing
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.runs.moves import move_near_the_middle
 from cdpr_drake.runs.paper_tests import paper_test, paper_tests
-from cdpr_drake.runs.running import Setup, prepare, run
+from cdpr_drake.runs.running import prepare, run
+from cdpr_drake.runs.setup import Setup, make_setup
 
 TEST = 4
 """The paper's test that its own robot makes; others make a short move near their middle."""
@@ -164,17 +166,16 @@ def ablation_setup(
     )
     believed = robot.replace(cameras=cameras)
     start, goal = _move(believed)
-    return Setup(
+    return make_setup(
         robot=believed.with_payload(unknown_payload) if unknown_payload else believed,
-        calibrated=believed,
+        believed=believed,
         start=start,
         goal=goal,
         gain=gain,
         until=DECAYS / gain,
         sample_time=robot.cameras.sample_time,
         latency=robot.cameras.latency,
-        sensors="targets",
-        modelled=sensors.modelled,
+        sensing=ModelledSensing(modelled=sensors.modelled, cameras=TargetSensing()),
         seed=seed,
     )
 

@@ -10,12 +10,14 @@ import numpy as np
 
 from cdpr_drake.analysis.default_gain import DefaultGain, lowest_gain
 from cdpr_drake.analysis.step_size import StepWarning
+from cdpr_drake.diagrams.sensing import sensing_called
 from cdpr_drake.model.calibration_errors import CalibrationErrors, misjudged
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.rotations import pose_to_vector
 from cdpr_drake.runs.moves import move_near_the_middle
 from cdpr_drake.runs.paper_tests import paper_test, paper_tests
-from cdpr_drake.runs.running import Setup, run
+from cdpr_drake.runs.running import run
+from cdpr_drake.runs.setup import Setup, make_setup
 
 METRICS = (
     "position_error",
@@ -121,10 +123,11 @@ def draw(
         case["gain"] = drawn["gain"] = gain
     robot = _carrying(load_robot(case.pop("robot")), case.pop("payload"))
     believed = misjudged(robot, CalibrationErrors().scaled(calibration), int(knowledge))
-    setup = Setup(
+    setup = make_setup(
         robot=robot,
-        calibrated=believed if calibration > 0.0 else None,
+        believed=believed if calibration > 0.0 else None,
         seed=int(noise),
+        sensing=sensing_called(case.pop("sensors", "gaussian")),
         **case,
     )
     return setup, drawn

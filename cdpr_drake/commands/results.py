@@ -44,16 +44,31 @@ def summarize(name: str, setup: Setup, runs: Sequence[Run]) -> dict[str, Any]:
         "goal_x_y_z_m_roll_pitch_yaw_deg": pose_values(setup.goal),
         "tensions": setup.tensions,
         "gain_per_s": setup.gain,
-        "sample_time_s": setup.sample_time,
-        "latency_s": setup.latency,
-        "calibrated": setup.calibrated is not None,
-        **{name: getattr(setup, name) for name in ("noise", "sensors", "estimator", "seed")},
+        **_sensing(setup),
+        "calibrated": setup.loop.believed is not None,
+        "noise": setup.noise,
+        "seed": setup.seed,
         "runs": {r.setup.label: {**_law(r.setup), **r.summary.to_dict()} for r in runs},
     }
 
 
 def _law(setup: Setup) -> dict[str, str]:
-    return {"controller": setup.controller, "cable_model": setup.cable_model}
+    return {"controller": setup.loop.controller, "cable_model": str(setup.loop.cable_model)}
+
+
+def _sensing(setup: Setup) -> dict[str, Any]:
+    """Return when and how cameras measure; nothing of joint space control."""
+    from cdpr_drake.diagrams import VisionLoop
+
+    if not isinstance(setup.loop, VisionLoop):
+        return {}
+    timing, sensing = setup.loop.timing, setup.loop.sensing
+    return {
+        "sample_time_s": timing.sample_time,
+        "latency_s": timing.latency,
+        "sensors": getattr(sensing, "name", type(sensing).__name__),
+        "estimator": getattr(sensing, "estimator", None),
+    }
 
 
 def print_results(runs: Sequence[Run]) -> None:

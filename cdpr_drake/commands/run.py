@@ -26,6 +26,7 @@ from cdpr_drake.commands.terminal import Progress, print_message, print_wrapped
 
 if TYPE_CHECKING:
     from cdpr_drake.analysis import DefaultGain
+    from cdpr_drake.diagrams import Timing
     from cdpr_drake.model.robot import CableRobot
     from cdpr_drake.runs import Prepared, Run, Setup
 
@@ -72,9 +73,9 @@ def _add_sensing(what: Any) -> None:
                       "pose from the patterns' points and tangents from the cables' edges; images, "
                       "the same detected in rendered images, which is slow (default: "
                       "gaussian)")  # fmt: skip
-    what.add_argument("--estimator", default="joint", metavar="KIND",
-                      help="of the pose from targets: joint, over all images; mean, the paper's "
-                      "(default: joint)")  # fmt: skip
+    what.add_argument("--estimator", metavar="KIND",
+                      help="of the pose from targets or images: joint, over all images; mean, the "
+                      "paper's (default: joint)")  # fmt: skip
     what.add_argument("--calibrated", metavar="NAME|FILE",
                       help="the robot as the controllers believe it, as `calibrate` writes it; "
                       "start and goal are the true robot's, in W (default: the true "
@@ -158,30 +159,41 @@ def plan(options: Namespace) -> Plan:
         CdprError, ValueError: they cannot be used.
     """
     from cdpr_drake.analysis import lowest_gain
+    from cdpr_drake.diagrams import JointSpaceLoop, VisionLoop
+    from cdpr_drake.diagrams.sensing import SENSORS, sensing_called
     from cdpr_drake.model.cable_models import CABLE_MODELS
-    from cdpr_drake.runs import Setup
+    from cdpr_drake.runs import make_setup
 
     move = resolve_move(options)
     values = _values(options, move)
+    believed = None
+    if options.calibrated is not None:
+        believed = _believed(options.calibrated, move.robot)
     setups = []
     if options.controller in ("vbc", "both"):
         models = dict.fromkeys(options.cable_model or DEFAULT_MODELS)
-        setups += [Setup(cable_model=m, **values) for m in models]
+        vision = VisionLoop(
+            sensing=sensing_called(options.sensors, options.estimator),
+            timing=_timing(options, move.robot),
+            believed=believed,
+        )
+        setups += [make_setup(loop=vision, cable_model=m, **values) for m in models]
     elif options.cable_model:
-        known = ", ".join(CABLE_MODELS)
-        raise ValueError(f"--cable-model ({known}) is VBC's; it has no meaning with JSC alone")
+        names = ", ".join(CABLE_MODELS)
+        raise ValueError(f"--cable-model ({names}) is VBC's; it has no meaning with JSC alone")
     if options.controller in ("jsc", "both"):
-        setups.append(Setup(controller="JSC", **values))
+        joint = JointSpaceLoop(believed=believed)
+        setups.append(make_setup(loop=joint, **values))
     chosen = lowest_gain(s.chosen for s in setups if s.chosen) if "gain" not in values else None
     if chosen is not None:
         setups = [_at_gain(s, chosen, options.until) for s in setups]
     is_test = move.number is not None and options.start is None and options.goal is None
     name = f"test-{move.number}" if is_test else as_file_name(move.robot.name)
     # Runs that see, believe or pull otherwise do not replace the plain one's results.
-    seen = "" if options.sensors == Setup.sensors else f"-{options.sensors}"
-    believed = "" if options.calibrated is None else "-calibrated"
+    seen = "" if options.sensors == SENSORS[0] else f"-{options.sensors}"
+    known = "" if options.calibrated is None else "-calibrated"
     pulled = "" if options.tensions == common.DEFAULT_RULE else f"-{as_file_name(options.tensions)}"
-    return Plan(f"{name}{seen}{believed}{pulled}", setups, chosen)
+    return Plan(f"{name}{seen}{known}{pulled}", setups, chosen)
 
 
 def _values(options: Namespace, move: Move) -> dict[str, Any]:
@@ -191,26 +203,29 @@ def _values(options: Namespace, move: Move) -> dict[str, Any]:
         "start": move.start,
         "goal": move.goal,
         "tensions": move.tensions,
-        "sample_time": move.robot.cameras.sample_time,
-        "latency": move.robot.cameras.latency,
         "noise": not options.no_noise,
         "seed": options.seed,
-        "sensors": options.sensors,
-        "estimator": options.estimator,
     }
     if move.test is not None:
         values["until"] = move.test.duration
         if options.test is not None:
             values["gain"] = move.test.gain
-    for field in ("gain", "latency", "sample_time", "until"):
+    for field in ("gain", "until"):
         given = getattr(options, field)
         if given is not None:
             values[field] = given
-    if values["sample_time"] == 0.0:
-        values["sample_time"] = None
-    if options.calibrated is not None:
-        values["calibrated"] = _believed(options.calibrated, move.robot)
     return values
+
+
+def _timing(options: Namespace, robot: CableRobot) -> Timing:
+    """Return when the vision loop looks and acts."""
+    from cdpr_drake.diagrams import Timing
+
+    given = {name: getattr(options, name) for name in ("sample_time", "latency")}
+    times = {name: getattr(robot.cameras, name) if t is None else t for name, t in given.items()}
+    if times["sample_time"] == 0.0:
+        times["sample_time"] = None
+    return Timing(**times)
 
 
 def _at_gain(setup: Setup, chosen: DefaultGain, until: float | None) -> Setup:
@@ -257,6 +272,7 @@ def describe(name: str, setup: Setup, chosen: DefaultGain | None = None) -> str:
         setup: of one of the runs.
         chosen: why their gain is what it is, if nobody asked for one.
     """
+    from cdpr_drake.diagrams import TargetSensing, VisionLoop
     from cdpr_drake.model.servo import pose_error
     from cdpr_drake.runs.moves import DECAYS, LONGEST
 
@@ -264,15 +280,17 @@ def describe(name: str, setup: Setup, chosen: DefaultGain | None = None) -> str:
     turn, way = math.degrees(math.hypot(*s[:3])), math.hypot(*s[3:])
     test = re.match(r"test-(\d+)", name)
     what = f"Test {test[1]} of the paper" if test else "A move"
-    loop = "a continuous loop"
-    if setup.sample_time is not None:
-        loop = f"{1.0 / setup.sample_time:g} Hz with {1e3 * setup.latency:g} ms of latency"
-    noise = f"noise with seed {setup.seed}" if setup.noise else "no noise"
-    if setup.sensors != "gaussian":
-        noise = f"sensors: {setup.sensors} ({setup.estimator} estimate), {noise}"
+    loop, noise = "", f"noise with seed {setup.seed}" if setup.noise else "no noise"
+    if isinstance(setup.loop, VisionLoop):
+        timing, sensing = setup.loop.timing, setup.loop.sensing
+        loop = "a continuous loop, "
+        if timing.sample_time is not None:
+            loop = f"{1.0 / timing.sample_time:g} Hz with {1e3 * timing.latency:g} ms of latency, "
+        if isinstance(sensing, TargetSensing):
+            noise = f"sensors: {sensing.name} ({sensing.estimator} estimate), {noise}"
     if setup.tensions != common.DEFAULT_RULE:
         noise = f"tensions {setup.tensions}, {noise}"
-    if setup.calibrated is not None:
+    if setup.loop.believed is not None:
         noise = f"a calibrated robot believed, {noise}"
     gain, rest = gain_in_words(setup.gain, chosen), ""
     decays = setup.gain * setup.until
@@ -280,7 +298,7 @@ def describe(name: str, setup: Setup, chosen: DefaultGain | None = None) -> str:
         rest = f" It ends after {decays:.2g} of the gain's time constants; --until lets it go on."
     return (
         f"{what} on {setup.robot.name}, {setup.robot.mass:g} kg: {way:.2f} m and {turn:.1f} deg in "
-        f"{setup.until:g} s, {gain}, {loop}, {noise}.{rest}"
+        f"{setup.until:g} s, {gain}, {loop}{noise}.{rest}"
     )
 
 

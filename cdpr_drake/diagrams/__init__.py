@@ -1,22 +1,38 @@
 """Robot and control loops as Drake diagrams, their rest contexts, and their simulation."""
 
 from cdpr_drake.diagrams.blocks import Block, blocks
-from cdpr_drake.diagrams.control import (
-    make_joint_space_control,
-    make_vision_based_control,
-    with_reference,
-)
+from cdpr_drake.diagrams.joint_space import JointSpaceLoop, make_joint_space_control
 from cdpr_drake.diagrams.rendering import make_pose_camera_images, rendering_available
 from cdpr_drake.diagrams.rest import rest_context, robot_of, set_at_rest
-from cdpr_drake.diagrams.robot import make_cable_robot, make_platform, platform_pose
+from cdpr_drake.diagrams.robot import make_cable_robot, make_plant, make_platform, platform_pose
+from cdpr_drake.diagrams.sensing import (
+    GaussianSensing,
+    ImageSensing,
+    Measurements,
+    ModelledSensing,
+    PlantToMeasure,
+    TargetSensing,
+)
 from cdpr_drake.diagrams.simulation import Record, make_simulator, simulate
+from cdpr_drake.diagrams.timing import Timing
+from cdpr_drake.diagrams.vision_loop import VisionLoop, make_vision_based_control
 
 __all__ = [
     "Block",
+    "GaussianSensing",
+    "ImageSensing",
+    "JointSpaceLoop",
+    "Measurements",
+    "ModelledSensing",
+    "PlantToMeasure",
     "Record",
+    "TargetSensing",
+    "Timing",
+    "VisionLoop",
     "blocks",
     "make_cable_robot",
     "make_joint_space_control",
+    "make_plant",
     "make_platform",
     "make_pose_camera_images",
     "make_simulator",
@@ -27,5 +43,4 @@ __all__ = [
     "robot_of",
     "set_at_rest",
     "simulate",
-    "with_reference",
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -82,7 +82,7 @@ class ServoSettings:
     Attributes:
         cable_model: "ECM", "CMWE", "SCMWE" or "SLSM": whose instantaneous row the law uses.
         order: order of the series of the ECM (eq. 6).
-        gain: lambda [1/s].
+        gain: lambda [1/s]; None leaves it open: the robot's own, else 0.1, or what a run finds.
         ramp_time: time over which the gain rises from zero at the start [s].
         max_speed: limit of the target frame's speed [m/s].
         max_angular_speed: limit of its angular speed [rad/s].
@@ -91,7 +91,7 @@ class ServoSettings:
 
     cable_model: str = "SCMWE"
     order: int = 4
-    gain: float = CUSTOMARY_GAIN
+    gain: float | None = None
     ramp_time: float = 1.0
     max_speed: float = np.inf
     max_angular_speed: float = np.inf
@@ -99,7 +99,7 @@ class ServoSettings:
 
     def __post_init__(self) -> None:
         cable_model_index(self.cable_model)  # refuses an unknown one
-        if not (np.isfinite(self.gain) and self.gain > 0.0):
+        if self.gain is not None and not (np.isfinite(self.gain) and self.gain > 0.0):
             raise ValueError(f"the gain must be positive and finite, got {self.gain} 1/s")
         if not (np.isfinite(self.ramp_time) and self.ramp_time >= 0.0):
             raise ValueError(f"the ramp time must not be negative, got {self.ramp_time} s")
@@ -108,11 +108,16 @@ class ServoSettings:
         if self.order < 1:
             raise ValueError(f"the order of the series must be at least 1, got {self.order}")
 
+    def of(self, robot: CableRobot) -> ServoSettings:
+        """Return the settings with a gain: a `robot`'s own, or the customary one, if it is open."""
+        if self.gain is not None:
+            return self
+        return replace(self, gain=CUSTOMARY_GAIN if robot.gain is None else robot.gain)
+
     def gain_at(self, time: float) -> float:
         """Return the gain [1/s] at a `time` [s] since the start, on its ramp."""
-        if time >= self.ramp_time:
-            return self.gain
-        return self.gain * max(time, 0.0) / self.ramp_time
+        gain = CUSTOMARY_GAIN if self.gain is None else self.gain
+        return gain if time >= self.ramp_time else gain * max(time, 0.0) / self.ramp_time
 
 
 class MotorRateLaw:

@@ -2,7 +2,8 @@
 
 from cdpr_drake.runs.metrics import Summary
 from cdpr_drake.runs.paper_tests import PaperTest, paper_test
-from cdpr_drake.runs.running import Prepared, Run, Setup, prepare, run, setup_of_test
+from cdpr_drake.runs.running import Prepared, Run, prepare, run
+from cdpr_drake.runs.setup import Setup, make_setup, setup_of_test
 
 __all__ = [
     "PaperTest",
@@ -10,6 +11,7 @@ __all__ = [
     "Run",
     "Setup",
     "Summary",
+    "make_setup",
     "paper_test",
     "prepare",
     "run",

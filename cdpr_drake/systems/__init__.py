@@ -19,6 +19,7 @@ from cdpr_drake.systems.servo import MotorAngleIntegrator, PoseError, PositionBa
 from cdpr_drake.systems.stereo import StereoTangentCameras
 from cdpr_drake.systems.stereo_images import StereoImageCameras
 from cdpr_drake.systems.targets import TargetCameras
+from cdpr_drake.systems.trajectory import TrajectoryReference
 from cdpr_drake.systems.winch import WinchDynamics
 from cdpr_drake.systems.zero_when_open import ZeroWhenOpen
 
@@ -64,6 +65,7 @@ __all__ = [
     "StereoImageCameras",
     "StereoTangentCameras",
     "TargetCameras",
+    "TrajectoryReference",
     "WinchDynamics",
     "WinchDynamics_",
     "ZeroWhenOpen",

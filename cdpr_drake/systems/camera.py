@@ -41,15 +41,15 @@ class CameraMeasurement(LeafSystem):
 
     Args:
         robot: the true robot, for its transforms and noise.
-        calibrated: the robot as the controller believes it; the true one if None.
+        believed: the robot as the controller believes it; the true one if None.
     """
 
-    def __init__(self, robot: CableRobot, calibrated: CableRobot | None = None) -> None:
+    def __init__(self, robot: CableRobot, believed: CableRobot | None = None) -> None:
         super().__init__()
         self.robot = robot
-        self.calibrated = calibrated if calibrated is not None else robot
+        self.believed = believed if believed is not None else robot
         true = robot.cameras
-        self._measured = MeasuredPose(robot, self.calibrated)
+        self._measured = MeasuredPose(robot, self.believed)
         self._sigma = np.repeat([true.orientation_noise, true.position_noise], 3)
         self._pose_port = self.DeclareVectorInputPort("pose", 6)
         self._noise_port = noise_input(self, 6)
@@ -58,7 +58,7 @@ class CameraMeasurement(LeafSystem):
 
     def true_pose(self, robot: CableRobot, seen: RigidTransform | ArrayLike) -> RigidTransform:
         """Return X_WP of the true `robot` when it is measured at the pose `seen`."""
-        return true_from_seen(robot, self.calibrated, seen)
+        return true_from_seen(robot, self.believed, seen)
 
     def _calc_pose(self, context: Context, output: BasicVector) -> None:
         pose = self._pose_port.Eval(context)

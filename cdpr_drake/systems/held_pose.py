@@ -48,17 +48,17 @@ class HeldPose(LeafSystem):
     once. OpenCV works on plain numbers, so there is no AutoDiffXd.
 
     Args:
-        calibrated: the robot as the controller believes it.
+        believed: the robot as the controller believes it.
         sample_time: period T [s].
 
     Raises:
         SimulationError: at an update, when no pose has been measured yet and none can be.
     """
 
-    def __init__(self, calibrated: CableRobot, sample_time: float) -> None:
+    def __init__(self, believed: CableRobot, sample_time: float) -> None:
         super().__init__()
-        self.calibrated = calibrated
-        num_cameras = len(calibrated.cameras.pose_cameras)
+        self.believed = believed
+        num_cameras = len(believed.cameras.pose_cameras)
         self.num_cameras, self.sample_time = num_cameras, sample_time
         self.DeclareDiscreteState(_SIZE)
         self.DeclarePeriodicDiscreteUpdateEvent(sample_time, 0.0, self._update)
@@ -94,7 +94,7 @@ class HeldPose(LeafSystem):
 
     def true_pose(self, robot: CableRobot, seen: RigidTransform | ArrayLike) -> RigidTransform:
         """Return X_WP of the true `robot` when it is measured at the pose `seen`."""
-        return true_from_seen(robot, self.calibrated, seen)
+        return true_from_seen(robot, self.believed, seen)
 
     def settle(self, context: Context) -> None:
         """Make the held pose what all cameras see now without noise.

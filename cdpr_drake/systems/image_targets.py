@@ -42,7 +42,7 @@ class ImageTargets(HeldPose):
     the platform but its images.
 
     Args:
-        calibrated: the robot as the controller believes it.
+        believed: the robot as the controller believes it.
         sample_time: period T [s]; that of the robot's cameras if None.
         estimator: "joint" or "mean", see `PoseEstimator`.
         outages: when cameras deliver no image.
@@ -56,16 +56,16 @@ class ImageTargets(HeldPose):
 
     def __init__(
         self,
-        calibrated: CableRobot,
+        believed: CableRobot,
         sample_time: float | None = None,
         estimator: str = "joint",
         outages: tuple[Outage, ...] = (),
     ) -> None:
-        cameras = calibrated.cameras
+        cameras = believed.cameras
         period = cameras.sample_time if sample_time is None else sample_time
-        super().__init__(calibrated, period)
+        super().__init__(believed, period)
         self._sizes = [(c.intrinsics.height, c.intrinsics.width) for c in cameras.pose_cameras]
-        self._estimate = ImagePoseEstimator(calibrated, estimator)
+        self._estimate = ImagePoseEstimator(believed, estimator)
         self._outages = Outages(outages, POSE_CAMERA, self.num_cameras)
         self._ports = [
             self.DeclareAbstractInputPort(f"image_{i + 1}", Value(ImageRgba8U()))

@@ -43,7 +43,7 @@ class LoadCellFilter(LeafSystem):
 
     Args:
         robot: the true robot, for its load cells.
-        calibrated: the robot as the controller believes it; the true one if None.
+        believed: the robot as the controller believes it; the true one if None.
         outages: when cells are stuck, which stops their filters too, or dead.
 
     Attributes:
@@ -56,17 +56,17 @@ class LoadCellFilter(LeafSystem):
     def __init__(
         self,
         robot: CableRobot,
-        calibrated: CableRobot | None = None,
+        believed: CableRobot | None = None,
         outages: tuple[Outage, ...] = (),
     ) -> None:
         super().__init__()
         self.robot = robot
-        self.calibrated = calibrated if calibrated is not None else robot
+        self.believed = believed if believed is not None else robot
         from cdpr_drake.model.kernels.load_cell import filter_derivatives
 
-        cells, believed = robot.load_cells, self.calibrated.load_cells
-        gain, sigma = cells.gain / believed.gain, cells.noise / believed.gain
-        bias = (cells.bias - believed.bias) / believed.gain
+        cells, ours = robot.load_cells, self.believed.load_cells
+        gain, sigma = cells.gain / ours.gain, cells.noise / ours.gain
+        bias = (cells.bias - ours.bias) / ours.gain
         rate = np.full(robot.num_cables, 2.0 * np.pi * cells.cutoff)
         self._filter, self.parameters = filter_derivatives, np.array([gain, bias, sigma, rate])
         self._order = cells.order
@@ -141,7 +141,7 @@ class LoadCellFilter(LeafSystem):
 
     def _fail(self, time: float, x: np.ndarray, xdot: np.ndarray) -> None:
         """Put what failing cells do into the derivatives; stuck ones keep what they show."""
-        believed, k = self.calibrated.load_cells, self._k
+        believed, k = self.believed.load_cells, self._k
         for cell, reading in self._outages.at(time).items():
             if reading is None:
                 xdot[cell::k] = 0.0 * x[cell::k]

@@ -59,7 +59,7 @@ class PositionBasedVisualServo(LeafSystem):
     def __init__(self, robot: CableRobot, settings: ServoSettings | None = None) -> None:
         super().__init__()
         self.robot = robot
-        self.settings = settings if settings is not None else ServoSettings()
+        self.settings = (settings if settings is not None else ServoSettings()).of(robot)
         self.steady_after = self.settings.ramp_time
         self._law = MotorRateLaw(robot, self.settings)
         self._error = PoseErrorMap(robot)

@@ -21,7 +21,7 @@ class StereoCameras(LeafSystem):
 
     Args:
         robot: the true robot.
-        calibrated: the robot as the controller believes it; the true one if None.
+        believed: the robot as the controller believes it; the true one if None.
         sample_time: period T [s]; that of the robot's cameras if None.
         outages: when pairs see nothing.
         noise_size: of the noise port.
@@ -34,16 +34,16 @@ class StereoCameras(LeafSystem):
     def __init__(
         self,
         robot: CableRobot,
-        calibrated: CableRobot | None,
+        believed: CableRobot | None,
         sample_time: float | None,
         outages: tuple[Outage, ...],
         noise_size: int,
     ) -> None:
         super().__init__()
         self.robot = robot
-        self.calibrated = calibrated if calibrated is not None else robot
+        self.believed = believed if believed is not None else robot
         self.sample_time = robot.cameras.sample_time if sample_time is None else sample_time
-        self._estimate = TangentEstimator(self.calibrated)
+        self._estimate = TangentEstimator(self.believed)
         self._outages = Outages(outages, STEREO_PAIR, len(robot.cameras.stereo_pairs))
         k = self._k = robot.num_cables
         self._tangents_port = self.DeclareVectorInputPort("tangents", 3 * k)
@@ -117,7 +117,7 @@ class StereoCameras(LeafSystem):
         held, bias = state[: 3 * k].reshape(-1, 3), state[4 * k : 5 * k]
         if not np.all(valid | held.any(axis=1)):
             X_WP = vector_to_pose(self._pose_port.Eval(context))
-            straight = cable_geometry(self.calibrated, X_WP).u
+            straight = cable_geometry(self.believed, X_WP).u
             held = np.where(held.any(axis=1, keepdims=True), held, straight)
         tangents = np.where(valid[:, None], estimate.tangents, held)
         bias = np.where(valid, estimate.curvature_bias, bias)
@@ -155,7 +155,7 @@ class StereoTangentCameras(StereoCameras):
 
     Args:
         robot: the true robot.
-        calibrated: the robot as the controller believes it; the true one if None.
+        believed: the robot as the controller believes it; the true one if None.
         sample_time: period T [s]; that of the robot's cameras if None.
         outages: when pairs see nothing.
 
@@ -167,12 +167,12 @@ class StereoTangentCameras(StereoCameras):
     def __init__(
         self,
         robot: CableRobot,
-        calibrated: CableRobot | None = None,
+        believed: CableRobot | None = None,
         sample_time: float | None = None,
         outages: tuple[Outage, ...] = (),
     ) -> None:
         self._images = CableImages(robot)
-        super().__init__(robot, calibrated, sample_time, outages, self._images.noise_size)
+        super().__init__(robot, believed, sample_time, outages, self._images.noise_size)
 
     def see(self, context: Context) -> Array:
         """Return the images (k, 2, 2, n, 2) [px] of the cables now, NaN where not seen.

@@ -40,7 +40,7 @@ class StereoImageCameras(StereoCameras):
 
     Args:
         robot: the true robot.
-        calibrated: the robot as the controller believes it; the true one if None.
+        believed: the robot as the controller believes it; the true one if None.
         sample_time: period T [s]; that of the robot's cameras if None.
         outages: when pairs deliver no image.
         drawing: draws the images; `CableDrawing(robot)` if None.
@@ -53,14 +53,14 @@ class StereoImageCameras(StereoCameras):
     def __init__(
         self,
         robot: CableRobot,
-        calibrated: CableRobot | None = None,
+        believed: CableRobot | None = None,
         sample_time: float | None = None,
         outages: tuple[Outage, ...] = (),
         drawing: CableDrawing | None = None,
     ) -> None:
-        super().__init__(robot, calibrated, sample_time, outages, noise_size=1)
+        super().__init__(robot, believed, sample_time, outages, noise_size=1)
         self._draw = drawing if drawing is not None else CableDrawing(robot)
-        self._detect = CableLines(self.calibrated)
+        self._detect = CableLines(self.believed)
 
     def see(self, context: Context) -> list[StereoImage | None]:
         """Return the left and right image of each pair now, None for a pair that delivers none.

@@ -47,7 +47,7 @@ class TargetCameras(HeldPose):
 
     Args:
         robot: the true robot.
-        calibrated: the robot as the controller believes it; the true one if None.
+        believed: the robot as the controller believes it; the true one if None.
         sample_time: period T [s]; that of the robot's cameras if None.
         estimator: "joint" or "mean", see `PoseEstimator`.
         outages: when cameras see nothing.
@@ -61,16 +61,16 @@ class TargetCameras(HeldPose):
     def __init__(
         self,
         robot: CableRobot,
-        calibrated: CableRobot | None = None,
+        believed: CableRobot | None = None,
         sample_time: float | None = None,
         estimator: str = "joint",
         outages: tuple[Outage, ...] = (),
     ) -> None:
         period = robot.cameras.sample_time if sample_time is None else sample_time
-        super().__init__(calibrated if calibrated is not None else robot, period)
+        super().__init__(believed if believed is not None else robot, period)
         self.robot = robot
         self._images = TargetImages(robot)
-        self._estimate = PoseEstimator(self.calibrated, estimator)
+        self._estimate = PoseEstimator(self.believed, estimator)
         self._outages = Outages(outages, POSE_CAMERA, self.num_cameras)
         self._pose_port = self.DeclareVectorInputPort("pose", 6)
         self._noise_port = noise_input(self, self._images.noise_size)
