@@ -22,12 +22,16 @@ def parse_pose(text: str) -> list[float]:
         text: x, y, z in metres; roll, pitch, yaw in degrees, 0 if left out.
 
     Raises:
-        argparse.ArgumentTypeError: it is no such text.
+        argparse.ArgumentTypeError: it is no such text, or an angle is beyond a full turn.
     """
     values = _numbers(text)
     if len(values) not in (3, 6):
         raise argparse.ArgumentTypeError(
             f"{text!r} is neither x,y,z [m] nor x,y,z,roll,pitch,yaw [m, deg]"
+        )
+    if any(abs(angle) > 360.0 for angle in values[3:]):
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: roll, pitch, yaw [deg] come last, none beyond a full turn"
         )
     angles = [math.radians(a) for a in values[3:]] or [0.0, 0.0, 0.0]
     return [*angles, *values[:3]]
