@@ -72,15 +72,20 @@ def parse_names(text: str) -> list[str]:
 
 
 def parse_model(text: str) -> str:
-    """Return the name of a cable model, which on a command line may be written in lower case.
-
-    The names are the same everywhere, ECM, CMWE, SCMWE and SLSM, and in Python and files there is
-    no other way to write them; but whoever types a command need not hold shift.
+    """Return the name of a cable model, spelt as Python takes it too.
 
     Args:
         text: as it was typed.
+
+    Raises:
+        argparse.ArgumentTypeError: there is no such model.
     """
-    return text.strip().upper()
+    from cdpr_drake.model.cable_models import cable_model_name
+
+    try:
+        return cable_model_name(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def parse_models(text: str) -> list[str]:
