@@ -31,12 +31,13 @@ test: $(INSTALLED)-test ## the tests, in two processes
 	@echo "Testing"
 	@$(BIN)/pytest -n 2 $(ARGS)
 
-lint: $(INSTALLED)-dev ## linter, formatter (nothing is rewritten) and type checker
+lint: $(INSTALLED)-dev ## linter, formatter (nothing is rewritten) and type checkers
 	@echo "Checking the code"
 	@status=0; \
 	$(BIN)/ruff check || status=1; \
 	$(BIN)/ruff format --check || status=1; \
 	$(BIN)/mypy || status=1; \
+	$(BIN)/python .ci/check_types.py cdpr_drake reproduction || status=1; \
 	exit $$status
 
 bench: $(INSTALLED)-bench ## the benchmarks, beside other programs' (NAME with ARGS=NAME)

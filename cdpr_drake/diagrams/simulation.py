@@ -79,7 +79,8 @@ class Record:
         rows = len(self.time)
         span = f"{self.time[0]:g} to {self.time[-1]:g} s, " if rows else ""
         sizes = [f"{name} ({v.shape[-1]})" for name, v in self.signals.items()]
-        lines = [f"Record: {span}{rows} row{'s' * (rows != 1)}, computed in {self.wall_time:.3g} s"]
+        count = f"{rows} row" if rows == 1 else f"{rows} rows"
+        lines = [f"Record: {span}{count}, computed in {self.wall_time:.3g} s"]
         lines += _wrapped("signals", sizes or ["none"], 4)
         if self.slack_cables:
             slack = [f"{cable} from {t:.3g} s" for cable, t in sorted(self.slack_cables.items())]
