@@ -27,8 +27,6 @@ from cdpr_drake.model.servo import D_a, ServoSettings
 from cdpr_drake.systems import InverseKinematicsAngles
 
 POSE = [0.0, 0.0, 0.1, 0.5, 0.2, 1.2]
-CABLE = {"Bx": 9.0, "Bz": -4.0, "w": 0.7, "EA": 1e5}
-HANGING = {"Bx": 9.0, "Bz": -4.0, "H": 300.0, "w": 0.7}
 
 
 @cache
@@ -50,14 +48,6 @@ def named(command: str, several: bool = False) -> Callable[[str], Any]:
 # How each place that takes the name of a cable model is asked for one, and what comes of it.
 ASKED: dict[str, Callable[[str], Any]] = {
     "cable_model_name": models.cable_model_name,
-    "cable_model_index": models.cable_model_index,
-    "unstrained_length": lambda m: models.unstrained_length(m, H=300.0, **CABLE),
-    "instantaneous_row": lambda m: models.instantaneous_row(m, H=300.0, **CABLE),
-    "instantaneous_row_chord": lambda m: models.instantaneous_row_chord(m, T=300.0, **CABLE),
-    "profile": lambda m: models.profile(4.0, model=m, **HANGING),
-    "cable_angles": lambda m: np.array(models.cable_angles(model=m, **HANGING)),
-    "sag": lambda m: models.sag(model=m, **HANGING),
-    "horizontal_tension": lambda m: models.horizontal_tension(m, 9.0, -4.0, 300.0, 0.7)[0],
     "ServoSettings": lambda m: ServoSettings(cable_model=m).cable_model,
     "D_a": lambda m: D_a(robot(), POSE, np.full(8, 300.0), m),
     "InverseKinematics": lambda m: InverseKinematics(robot(), m).lengths(POSE),

@@ -11,6 +11,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from cdpr_drake.commands import UsageError
+
 FEWEST, MOST = 2, 400
 """Of the values in a span."""
 
@@ -78,14 +80,14 @@ def parse_model(text: str) -> str:
         text: as it was typed.
 
     Raises:
-        argparse.ArgumentTypeError: there is no such model.
+        UsageError: there is no such model.
     """
     from cdpr_drake.model.cable_models import cable_model_name
 
     try:
         return cable_model_name(text)
     except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from None
+        raise UsageError(str(error)) from None
 
 
 def parse_models(text: str) -> list[str]:

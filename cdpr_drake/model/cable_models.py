@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 CABLE_MODELS = ("ECM", "CMWE", "SCMWE", "SLSM")
-"""The models' names, the paper's; where one is asked for, lower case is taken too."""
+"""The models' names, the paper's."""
 
 _POSITIVE = ("Bx", "H", "T", "EA")
 _NOT_NEGATIVE = ("T_A", "w")
@@ -61,8 +61,9 @@ class CableEnds(NamedTuple):
 def cable_model_name(model: str) -> str:
     """Return a cable model's name as it stands in `CABLE_MODELS`.
 
-    Whoever takes a name from a user, in Python, in a file or on a command line, takes it through
-    this, so that all take the same spellings.
+    Whoever takes a name from a user, in Python or on a command line, takes it through this, so that
+    all take the same spellings. The functions of this module are asked by those: they take a name
+    as it stands.
 
     Args:
         model: the name, in upper or lower case.
@@ -70,22 +71,21 @@ def cable_model_name(model: str) -> str:
     Raises:
         ValueError: an unknown model; the message names the known ones.
     """
-    name = str(model).strip().upper()
-    if name not in CABLE_MODELS:
-        raise ValueError(f'unknown cable model "{name}"; known are {", ".join(CABLE_MODELS)}')
-    return name
+    return CABLE_MODELS[cable_model_index(str(model).strip().upper())]
 
 
 def cable_model_index(model: str) -> int:
     """Return the number by which the kernels know a cable model.
 
     Args:
-        model: one of `CABLE_MODELS`, in upper or lower case.
+        model: one of `CABLE_MODELS`.
 
     Raises:
         ValueError: an unknown model; the message names the known ones.
     """
-    return CABLE_MODELS.index(cable_model_name(model))
+    if model not in CABLE_MODELS:
+        raise ValueError(f'unknown cable model "{model}"; known are {", ".join(CABLE_MODELS)}')
+    return CABLE_MODELS.index(model)
 
 
 def unstrained_length(
@@ -285,7 +285,7 @@ def horizontal_tension(
     columns = _columns(Bx=Bx, Bz=Bz, T_A=T_A, w=w)
     if cable_model_index(model) == kernels.SLSM:
         columns = (*columns[:3], np.zeros_like(columns[3]))
-    is_catenary = cable_model_name(model) in ("ECM", "CMWE")
+    is_catenary = model in ("ECM", "CMWE")
     kernel = kernels.horizontal_force_catenary if is_catenary else kernels.horizontal_force_parabola
     result = _over_cables(kernel, (), columns, 2)
     return result[..., 0], result[..., 1] != 0.0
@@ -322,7 +322,7 @@ def _checked_rows(
 
     head = (cable_model_index(model), _order(order))
     Bx, Bz, _, w, EA = columns
-    if cable_model_name(model) == "ECM":
+    if model == "ECM":
         tension = _over_cables(kernels.largest_tension, (), (Bx, Bz, chord_tension, w))
         text = "reaches EA, where the series of eq. (6) diverges"
         _refuse("largest tension [N]", tension, np.greater_equal(tension, EA), text)
