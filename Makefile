@@ -18,25 +18,37 @@ unexport PYTHONPATH PYTHONHOME
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help demo test lint bench reproduce warm clean
+.PHONY: help demo test test-slow test-all lint bench reproduce warm clean
 
 help: ## this list
 	@echo "make TARGET [PYTHON=an interpreter for .venv] [ARGS=options passed on]"
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  %-9s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  %-9s %s\n", $$1, $$2 }' Makefile
 
 demo: $(INSTALLED)-demo ## a robot carries a load under vision-based control, and the plots of it
 	@$(BIN)/cdpr-drake run $(ARGS)
 
-test: $(INSTALLED)-test ## the tests, in two processes
+test: $(INSTALLED)-test ## the tests of what the package does, in two processes
 	@echo "Testing"
-	@$(BIN)/pytest -n 2 $(ARGS)
+	@$(BIN)/pytest -n 2 -m "not slow" $(ARGS)
 
-lint: $(INSTALLED)-dev ## linter, formatter (nothing is rewritten) and type checker
+test-slow: $(INSTALLED)-test ## the other tests: notebooks, benchmarks, figures that are written down
+	@echo "Testing notebooks, benchmarks and figures"
+	@$(BIN)/pytest -n 2 -m slow $(ARGS)
+
+# Not two prerequisites: the second shall run even if the first fails.
+test-all: $(INSTALLED)-test ## all tests
+	@status=0; \
+	$(MAKE) --no-print-directory test || status=1; \
+	$(MAKE) --no-print-directory test-slow || status=1; \
+	exit $$status
+
+lint: $(INSTALLED)-dev ## linter, formatter (nothing is rewritten) and type checkers
 	@echo "Checking the code"
 	@status=0; \
 	$(BIN)/ruff check || status=1; \
 	$(BIN)/ruff format --check || status=1; \
 	$(BIN)/mypy || status=1; \
+	$(BIN)/python .ci/check_types.py cdpr_drake reproduction || status=1; \
 	exit $$status
 
 bench: $(INSTALLED)-bench ## the benchmarks, beside other programs' (NAME with ARGS=NAME)

@@ -218,6 +218,7 @@ def test_an_undamped_slow_mode_grows_at_half_the_gain_and_drag_stops_it(x: float
     assert SampledServo(robot, pose, drag=0.065).growth(gain, 0.04).real < 0.0
 
 
+@pytest.mark.slow
 def test_the_page_on_damping_has_what_is_computed() -> None:
     spec = importlib.util.spec_from_file_location("make_damping", DOCS / "make_damping.py")
     assert spec is not None and spec.loader is not None

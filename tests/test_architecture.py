@@ -7,10 +7,12 @@ import dataclasses
 import importlib
 import importlib.util
 import inspect
+import io
 import re
 import shutil
 import subprocess
 import sys
+import tokenize
 import warnings
 from collections.abc import Iterator
 from enum import Enum
@@ -213,6 +215,58 @@ def test_another_spelling_of_a_chord_is_found() -> None:
     for text in ("x = EB + p - robot.drawing_points", "x = p_WB[i, 0] - float(p_WA[i, 0])"):
         assert less_drawing_points(ast.parse(text))
     assert not less_drawing_points(ast.parse("x = drawing_points[1] - drawing_points[0]"))
+
+
+# --- functions that fit on a screen
+
+LONGEST = 60
+"""Lines of code in a function, without docstrings, comments and blank lines."""
+
+NO_CODE = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT)
+
+
+def long_functions(text: str, longest: int = LONGEST) -> list[str]:
+    """Return the functions of a source text with more lines of code than `longest`."""
+    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+    lines = {n for t in tokens if t.type not in NO_CODE for n in range(t.start[0], t.end[0] + 1)}
+    tree = ast.parse(text)
+    for node in ast.walk(tree):
+        is_scope = isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
+        if is_scope and ast.get_docstring(node, clean=False) is not None:
+            lines -= {*range(node.body[0].lineno, node.body[0].end_lineno + 1)}
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    return [
+        f.name for f in functions if len(lines & {*range(f.lineno, f.end_lineno + 1)}) > longest
+    ]
+
+
+def test_no_function_is_long() -> None:
+    sources = {n: p.read_text(encoding="utf-8") for n, p in SOURCES.items()}
+    found = {n: long_functions(t) for n, t in sources.items() if not n.startswith(KERNELS)}
+    assert not {name: functions for name, functions in found.items() if functions}
+
+
+def test_a_long_function_is_found_by_its_code_alone() -> None:
+    text = '''"""A module."""
+
+class A:
+    """A class."""
+
+    def f(self, x):
+        """Return x.
+
+        In many lines.
+        """
+        # A comment.
+        y = (
+            x
+        )
+
+        return y  # four lines and the head
+'''
+    assert long_functions(text, 5) == []
+    assert long_functions(text, 4) == ["f"]
+    assert long_functions("def f():\n    def g():\n        return 1\n    return g\n", 3) == ["f"]
 
 
 # --- documentation

@@ -50,6 +50,7 @@ WITH = [(name, True) for name in SMALLEST]
 WITHOUT = [(name, False) for name in ("peers_cable", "peers_equilibrium", "peers_loop")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "with_peers"), WITH + WITHOUT)
 def test_a_benchmark_runs(
     name: str, with_peers: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

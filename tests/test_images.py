@@ -447,7 +447,6 @@ def test_a_figure_shows_what_each_camera_sees(
 
 
 @pytest.mark.render
-@pytest.mark.slow
 @pytest.mark.needs("egl", "numba")
 def test_the_loop_arrives_on_rendered_images(cogiro: CableRobot) -> None:
     """From 50 mm and 1 degree beside the goal of Test 4, on noisy pixels of eleven cameras."""

@@ -118,6 +118,7 @@ def test_holds_nothing_of_the_machine_it_ran_on(path: Path) -> None:
         assert not found, f"{found[0]!r} in\n{text[-400:]}" if found else ""
 
 
+@pytest.mark.slow
 @pytest.mark.notebook
 @each_notebook
 def test_runs(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,6 @@ import pytest
 from reference_runs import FILE, RUNS, poses
 
 
-@pytest.mark.slow
 @pytest.mark.needs("numba")  # without, they take minutes
 @pytest.mark.parametrize("name", RUNS)
 def test_a_run_is_the_one_that_was_kept(name: str) -> None:

@@ -65,6 +65,7 @@ def test_the_search_finds_a_set_it_was_not_told(robots: ScaledRobots) -> None:
     assert np.abs(dbeta / wanted - 1.0).max() < 1e-3
 
 
+@pytest.mark.slow
 def test_the_paper_s_numbers_are_met_by_one_set(results: dict) -> None:
     common = results["common"]
     assert common["free"] == 10
@@ -77,6 +78,7 @@ def test_the_paper_s_numbers_are_met_by_one_set(results: dict) -> None:
         assert results[key]["rms"] > common["rms"]
 
 
+@pytest.mark.slow
 def test_the_file_holds_what_the_search_finds(results: dict) -> None:
     for n, (low, high) in RANGES.items():
         entry = assumptions("table6")[n]
@@ -84,6 +86,7 @@ def test_the_file_holds_what_the_search_finds(results: dict) -> None:
         assert abs(entry.value - results["common"]["values"][n]) < 2e-3 * (high - low), n
 
 
+@pytest.mark.slow
 def test_most_random_orders_of_the_cables_are_followed_as_well(results: dict) -> None:
     found = results["permuted-0"]
     assert found["rms"].shape == found["rank"].shape == (PERMUTED,)
@@ -93,6 +96,7 @@ def test_most_random_orders_of_the_cables_are_followed_as_well(results: dict) ->
     assert results["random"]["held_up"] > 1000 and results["random"]["growing"] > 0.9
 
 
+@pytest.mark.slow
 def test_another_seed_finds_the_same(robots: ScaledRobots, results: dict) -> None:
     theirs = table6.printed_dbeta(table6.SIZES)
     found = search(robots, theirs, RANGES, {"mass": 50.0}, seed=1)
@@ -107,6 +111,7 @@ def test_ranks_that_tie_are_shared() -> None:
     assert table6_work.rank_correlation(a, b) == pytest.approx(spearmanr(a, b).statistic)
 
 
+@pytest.mark.slow
 def test_the_section_claims_what_the_numbers_say(results: dict) -> None:
     others = {key: results["level"] for key in table6.LOOKS}
     results = {**others, **results}

@@ -97,6 +97,7 @@ def test_what_is_left_has_the_order_and_size_printed(slow: np.ndarray) -> None:
     assert np.exp(np.abs(np.log(slow / printed_errors()))).max() < 1.5
 
 
+@pytest.mark.slow
 @pytest.mark.needs("numba")  # without, it takes minutes
 def test_no_fitted_value_does_better_elsewhere(values: dict[str, Any], slow: np.ndarray) -> None:
     def cost(errors: np.ndarray) -> float:
@@ -114,6 +115,7 @@ def test_no_fitted_value_does_better_elsewhere(values: dict[str, Any], slow: np.
             assert cost(slow_errors(values | {name: values[name] * change})) > at_file, name
 
 
+@pytest.mark.slow
 @pytest.mark.needs("numba")  # without, it takes minutes
 def test_dynamics_change_the_end_little(moves: dict[str, Any], slow: np.ndarray) -> None:
     for i, model in ((0, "ECM"), (3, "SLSM")):
@@ -124,12 +126,14 @@ def test_dynamics_change_the_end_little(moves: dict[str, Any], slow: np.ndarray)
         assert np.exp(np.abs(np.log(ratio))).max() < 1.5
 
 
+@pytest.mark.slow
 @pytest.mark.needs("numba")  # without, it takes minutes
 def test_only_the_straight_line_model_strays(moves: dict[str, Any]) -> None:
     ecm, slsm = (np.array(excursions(moves[f"move_{m}"])) for m in ("ECM", "SLSM"))
     assert slsm[0] > 5.0 * ecm[0] and slsm[1] > 4.0 * ecm[1]
 
 
+@pytest.mark.slow
 @pytest.mark.needs("numba")  # without, it takes minutes
 def test_a_run_holds_what_its_figure_needs(moves: dict[str, Any]) -> None:
     result = moves["move_ECM"]
@@ -144,6 +148,7 @@ def test_a_run_holds_what_its_figure_needs(moves: dict[str, Any]) -> None:
     )
 
 
+@pytest.mark.slow
 def test_an_undamped_mode_grows_at_half_the_gain(values: dict[str, Any]) -> None:
     """And drag of the size of the gain stops it; the simulations have more all along the way."""
     for x in (0.0, 20.0):

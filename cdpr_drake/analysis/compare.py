@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analysis.gain_matrix import GainMatrix, gain_matrix
-from cdpr_drake.model.cable_models import CABLE_MODELS
+from cdpr_drake.model.cable_models import CABLE_MODELS, cable_model_name
 from cdpr_drake.model.robot import CableRobot, load_robot
 
 ROBOTS = ("cogiro", "cogiro-22m", "cogiro-37m", "cogiro-98m")
@@ -66,8 +66,12 @@ class Comparison:
 
         Args:
             cable_model: "ECM", "CMWE", "SCMWE" or "SLSM".
+
+        Raises:
+            ValueError: an unknown cable model.
         """
-        return tuple(row for row in self.rows if row.cable_model == cable_model)
+        name = cable_model_name(cable_model)
+        return tuple(row for row in self.rows if row.cable_model == name)
 
     def __str__(self) -> str:
         lines = [
@@ -107,7 +111,7 @@ def compare_cable_models(
         RobotFileError: there is no robot of that name.
         ValueError: an unknown cable model or rule.
     """
-    models = tuple(cable_models)
+    models = tuple(map(cable_model_name, cable_models))
     rows = []
     for item in robots:
         robot = item if isinstance(item, CableRobot) else load_robot(item)

@@ -13,7 +13,7 @@ from cdpr_drake.analysis.platform_modes import rest_modes
 from cdpr_drake.analysis.stability import SampledServo
 from cdpr_drake.diagrams.watch import LimitWatch
 from cdpr_drake.errors import CdprError, SimulationError
-from cdpr_drake.model.cable_models import CABLE_MODELS
+from cdpr_drake.model.cable_models import cable_model_name
 from cdpr_drake.model.rest_model import RestModel
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, pose_to_vector
@@ -116,9 +116,7 @@ def explore_pose(
     Raises:
         ValueError: an unknown cable model or rule, or a gain that is not positive.
     """
-    if cable_model not in CABLE_MODELS:
-        known = ", ".join(CABLE_MODELS)
-        raise ValueError(f'unknown cable model "{cable_model}"; known are {known}')
+    cable_model = cable_model_name(cable_model)
     if not (np.isfinite(gain) and gain > 0.0):
         raise ValueError(f"the gain must be positive and finite, got {gain}/s")
     X_WP = as_pose(pose)

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import CdprError
+from cdpr_drake.model.cable_models import cable_model_name
 from cdpr_drake.model.camera import true_from_seen
 from cdpr_drake.model.equilibrium import rest_state
 from cdpr_drake.model.kinematics import D_t
@@ -215,7 +216,7 @@ class _Asker:
         self.believed = believed if believed is not None else robot
         fields = {**(vars(settings) if settings else {}), "cable_model": cable_model}
         self.law = MotorRateLaw(self.believed, ServoSettings(**fields))
-        self.cable_model, self.judge = cable_model, CellJudge(self.believed)
+        self.cable_model, self.judge = cable_model_name(cable_model), CellJudge(self.believed)
 
     def __call__(self, pose: RigidTransform | ArrayLike) -> GainMatrix:
         seen = as_pose(pose)

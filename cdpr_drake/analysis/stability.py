@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context, Diagram
 
 from cdpr_drake.analysis.gain_matrix import gain_matrix, target_twist
 from cdpr_drake.diagrams.timing import Timing
@@ -421,7 +422,7 @@ def stability_map(
     )
 
 
-def warn_if_unstable(diagram: Any, context: Any) -> Modes:
+def warn_if_unstable(diagram: Diagram, context: Context) -> Modes:
     """Return the modes of a sampled loop, after a StabilityWarning if any of them grows.
 
     Args:

@@ -11,6 +11,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from cdpr_drake.commands import UsageError
+
 FEWEST, MOST = 2, 400
 """Of the values in a span."""
 
@@ -22,12 +24,16 @@ def parse_pose(text: str) -> list[float]:
         text: x, y, z in metres; roll, pitch, yaw in degrees, 0 if left out.
 
     Raises:
-        argparse.ArgumentTypeError: it is no such text.
+        argparse.ArgumentTypeError: it is no such text, or an angle is beyond a full turn.
     """
     values = _numbers(text)
     if len(values) not in (3, 6):
         raise argparse.ArgumentTypeError(
             f"{text!r} is neither x,y,z [m] nor x,y,z,roll,pitch,yaw [m, deg]"
+        )
+    if any(abs(angle) > 360.0 for angle in values[3:]):
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: roll, pitch, yaw [deg] come last, none beyond a full turn"
         )
     angles = [math.radians(a) for a in values[3:]] or [0.0, 0.0, 0.0]
     return [*angles, *values[:3]]
@@ -68,15 +74,20 @@ def parse_names(text: str) -> list[str]:
 
 
 def parse_model(text: str) -> str:
-    """Return the name of a cable model, which on a command line may be written in lower case.
-
-    The names are the same everywhere, ECM, CMWE, SCMWE and SLSM, and in Python and files there is
-    no other way to write them; but whoever types a command need not hold shift.
+    """Return the name of a cable model, spelt as Python takes it too.
 
     Args:
         text: as it was typed.
+
+    Raises:
+        UsageError: there is no such model.
     """
-    return text.strip().upper()
+    from cdpr_drake.model.cable_models import cable_model_name
+
+    try:
+        return cable_model_name(text)
+    except ValueError as error:
+        raise UsageError(str(error)) from None
 
 
 def parse_models(text: str) -> list[str]:

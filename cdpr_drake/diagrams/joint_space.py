@@ -11,7 +11,7 @@ from pydrake.trajectories import Trajectory
 
 from cdpr_drake.diagrams.robot import make_plant
 from cdpr_drake.diagrams.wiring import SystemOrMaker, add_plant, add_reference, check_robot, finish
-from cdpr_drake.model.cable_models import cable_model_index
+from cdpr_drake.model.cable_models import cable_model_name
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.systems import InverseKinematicsAngles, PoseError
 from cdpr_drake.systems.fused_plant import fused_refusal
@@ -40,7 +40,7 @@ class JointSpaceLoop:
     ramp_time: float = 1.0
 
     def __post_init__(self) -> None:
-        cable_model_index(self.cable_model)  # refuses an unknown one
+        object.__setattr__(self, "cable_model", cable_model_name(self.cable_model))
 
     def replace(self, **fields: Any) -> JointSpaceLoop:
         """Return a copy with some `fields` changed."""

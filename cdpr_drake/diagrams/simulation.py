@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import importlib
 import math
+import os
+import textwrap
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
-from pydrake.systems.framework import Context, Diagram
+from pydrake.systems.framework import Context, Diagram, OutputPort, PortDataType
 
 from cdpr_drake.diagrams.rest import robot_of
 from cdpr_drake.diagrams.watch import WATCH_PERIOD, LimitWatch
+from cdpr_drake.model.signals import vector_names
 
 INTEGRATOR = "runge_kutta3"
 """Default integrator, by Drake's name: the fastest to 1e-3 mm (benchmarks/bench_integrators.py)."""
@@ -42,6 +48,10 @@ RECORDED = (
 """Ports that `simulate` records, those of them that a diagram has."""
 
 
+WATCHED = ("pose", "tension_at_drawing_point")
+"""Ports that a diagram must have to be simulated: its limits are watched by them."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Record:
     """What a run left behind.
@@ -63,6 +73,61 @@ class Record:
     def __getitem__(self, name: str) -> np.ndarray:
         """Return the values (n, size) of a recorded output port."""
         return self.signals[name]
+
+    def __repr__(self) -> str:
+        """How long, how often, what was recorded, and what went slack, in a few lines."""
+        rows = len(self.time)
+        span = f"{self.time[0]:g} to {self.time[-1]:g} s, " if rows else ""
+        sizes = [f"{name} ({v.shape[-1]})" for name, v in self.signals.items()]
+        count = f"{rows} row" if rows == 1 else f"{rows} rows"
+        lines = [f"Record: {span}{count}, computed in {self.wall_time:.3g} s"]
+        lines += _wrapped("signals", sizes or ["none"], 4)
+        if self.slack_cables:
+            slack = [f"{cable} from {t:.3g} s" for cable, t in sorted(self.slack_cables.items())]
+            lines += _wrapped("slack cables", slack, 1)
+        return "\n".join(lines)
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """Return "time" and each entry of each signal, (n,) each, by its name in linear models.
+
+        The names are those of `vector_names`: "pose/yaw", "tension_at_winch[8]".
+        """
+        columns = {"time": self.time}
+        for name, values in self.signals.items():
+            columns |= zip(vector_names(name, values.shape[1]), values.T, strict=True)
+        return columns
+
+    def to_csv(self, path: str | os.PathLike[str]) -> Path:
+        """Write a heading and a line for each time, with all digits, and return the path.
+
+        The columns are those of `columns`, in SI units: s, m, rad, N.
+
+        Args:
+            path: of the file, which is replaced if it exists.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        columns, file = self.columns(), Path(path)
+        with file.open("w", encoding="utf-8", newline="") as lines:
+            lines.write(",".join(columns) + "\n")
+            np.savetxt(lines, np.column_stack(list(columns.values())), "%.17g", delimiter=",")
+        return file
+
+    def to_dataframe(self) -> Any:
+        """Return a pandas DataFrame with the columns of `columns`, "time" as its index.
+
+        Raises:
+            ImportError: pandas is not installed; this package does not require it.
+        """
+        try:
+            pandas = importlib.import_module("pandas")
+        except ImportError as error:
+            raise ImportError(
+                'to_dataframe() needs pandas, which is not installed: "pip install pandas"; '
+                "to_csv(path) does without it"
+            ) from error
+        return pandas.DataFrame(self.columns()).set_index("time")
 
     @property
     def real_time_factor(self) -> float:
@@ -88,8 +153,12 @@ def make_simulator(
         integrator: as Drake calls it.
 
     Raises:
+        ValueError: a step or an accuracy that is not positive and finite.
         RuntimeError: Drake has no such integrator, or none with or without error control.
     """
+    _check_positive("the integrator's step, max_step,", max_step, " s")
+    if accuracy is not None:
+        _check_positive("the accuracy", accuracy)
     simulator = Simulator(diagram, context)
     config = SimulatorConfig()
     config.integration_scheme = integrator
@@ -116,11 +185,18 @@ def simulate(
 ) -> Record:
     """Run a diagram to a time and return what was recorded.
 
+    The diagram is one of this package or one built around it. Of the latter it is asked that the
+    robot is somewhere inside, and that it exports two of the robot's outputs, which are watched
+    during the run: "pose", [roll, pitch, yaw, x, y, z], and "tension_at_drawing_point", one for
+    each cable. `DiagramBuilder.ExportOutput(robot.GetOutputPort("pose"), "pose")` does that for
+    the first.
+
     Args:
-        diagram: a diagram of this package, or one built around it, with an output "pose".
+        diagram: the diagram.
         context: where it starts; it is moved on to the end.
-        until: [s].
-        record: names of output ports; those of `RECORDED` that the diagram has if None.
+        until: [s], from the context's time on.
+        record: names of output ports, each of which has to be there; those of `RECORDED` that the
+            diagram has if None.
         every: period of the record [s].
         max_step: step of the integrator [s].
         accuracy: for error control; fixed steps if None.
@@ -128,20 +204,25 @@ def simulate(
         progress: called with the time at each record.
 
     Raises:
-        ValueError: an end or period that is none.
+        ValueError: an end, period, step or accuracy that is none; a name of no output port with
+            numbers; a diagram that does not export what is watched.
         CableError: a cable broke or has no equilibrium.
         SimulationError: the platform left the hull of the drawing points, its pitch came within 5
             degrees of 90, or a value is not finite.
     """
     if not (math.isfinite(until) and math.isfinite(every) and every > 0.0):
         raise ValueError(f"a run needs a finite end and a positive period, got {until}, {every} s")
-    names = RECORDED if record is None else record
-    ports = {n: diagram.GetOutputPort(n) for n in names if diagram.HasOutputPort(n)}
+    if until < context.get_time() - 1e-9:
+        raise ValueError(
+            f"the run is to end at {until:g} s, but the context is at {context.get_time():g} s "
+            "already"
+        )
+    outputs = _vector_outputs(diagram)
+    pose, tension = (_watched(diagram, outputs, name) for name in WATCHED)
+    ports = _recorded(outputs, record)
     times: list[float] = []
     values: dict[str, list[np.ndarray]] = {name: [] for name in ports}
     watch = LimitWatch(robot_of(diagram))
-    pose = diagram.GetOutputPort("pose")
-    tension = diagram.GetOutputPort("tension_at_drawing_point")
     simulator = make_simulator(
         diagram, context, max_step=max_step, accuracy=accuracy, integrator=integrator
     )
@@ -163,6 +244,56 @@ def simulate(
         context=context,
         wall_time=time.perf_counter() - begun,
         slack_cables=watch.slack,
+    )
+
+
+def _check_positive(what: str, value: float, unit: str = "") -> None:
+    if not (math.isfinite(value) and value > 0.0):
+        raise ValueError(f"{what} must be positive and finite, got {value}{unit}")
+
+
+def _vector_outputs(diagram: Diagram) -> dict[str, OutputPort]:
+    """Return the output ports of a diagram that give numbers, by their names."""
+    ports = map(diagram.get_output_port, range(diagram.num_output_ports()))
+    return {p.get_name(): p for p in ports if p.get_data_type() == PortDataType.kVectorValued}
+
+
+def _watched(diagram: Diagram, outputs: Mapping[str, OutputPort], name: str) -> OutputPort:
+    """Return an output port that every run is watched by."""
+    if name not in outputs:
+        raise ValueError(
+            f'diagram "{diagram.get_name()}" has no output port "{name}", by which a run is '
+            f'watched: export the robot\'s, ExportOutput(robot.GetOutputPort("{name}"), '
+            f'"{name}"), before the diagram is built'
+        )
+    return outputs[name]
+
+
+def _recorded(
+    outputs: Mapping[str, OutputPort], asked: Iterable[str] | None
+) -> dict[str, OutputPort]:
+    """Return the output ports to record: those asked for, or those of RECORDED that there are."""
+    if asked is None:
+        return {name: outputs[name] for name in RECORDED if name in outputs}
+    names = [asked] if isinstance(asked, str) else list(asked)
+    unknown = [f'"{name}"' for name in names if name not in outputs]
+    if unknown:
+        raise ValueError(
+            f"nothing to record by the name of {', '.join(unknown)}; the diagram's output ports "
+            f"are {', '.join(sorted(outputs))}"
+        )
+    return {name: outputs[name] for name in names}
+
+
+def _wrapped(head: str, items: Iterable[str], lines: int) -> list[str]:
+    """Return items as a list of some lines at most, with what they are at its head."""
+    return textwrap.wrap(
+        f"{head}: {', '.join(items)}",
+        width=100,
+        initial_indent="  ",
+        subsequent_indent="    ",
+        max_lines=lines,
+        placeholder=" ...",
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from pydrake.common import RandomDistribution
 from pydrake.systems.framework import Diagram, DiagramBuilder, InputPort, OutputPort, System
@@ -35,7 +35,7 @@ def made(slot: SystemOrMaker, robot: CableRobot, what: str) -> System:
     return system
 
 
-def check_robot(robot: Any) -> None:
+def check_robot(robot: object) -> None:
     """Raise TypeError, with what is wanted, unless something is a `robot`."""
     if isinstance(robot, CableRobot):
         return

@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 CABLE_MODELS = ("ECM", "CMWE", "SCMWE", "SLSM")
+"""The models' names, the paper's."""
 
 _POSITIVE = ("Bx", "H", "T", "EA")
 _NOT_NEGATIVE = ("T_A", "w")
@@ -55,6 +56,22 @@ class CableEnds(NamedTuple):
     V_B: Array
     T_A: Array
     T_B: Array
+
+
+def cable_model_name(model: str) -> str:
+    """Return a cable model's name as it stands in `CABLE_MODELS`.
+
+    Whoever takes a name from a user, in Python or on a command line, takes it through this, so that
+    all take the same spellings. The functions of this module are asked by those: they take a name
+    as it stands.
+
+    Args:
+        model: the name, in upper or lower case.
+
+    Raises:
+        ValueError: an unknown model; the message names the known ones.
+    """
+    return CABLE_MODELS[cable_model_index(str(model).strip().upper())]
 
 
 def cable_model_index(model: str) -> int:

@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import GeometryError, TensionError
 from cdpr_drake.model.arrays import RobotArrays
-from cdpr_drake.model.cable_models import cable_model_index
+from cdpr_drake.model.cable_models import cable_model_index, cable_model_name
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, as_pose, pose_to_vector
 
@@ -32,7 +32,7 @@ class InverseKinematics:
         from cdpr_drake.model.kernels import inverse as kernel
 
         self.robot, self._kernel = robot, kernel
-        self._head = (cable_model_index(cable_model), order)
+        self._head = (cable_model_index(cable_model_name(cable_model)), order)
         arrays = RobotArrays(robot)
         self._robot_arrays = (arrays.points, arrays.body, arrays.stiffness)
 

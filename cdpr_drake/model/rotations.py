@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydrake.autodiffutils import AutoDiffXd
+from pydrake.autodiffutils import AutoDiffXd, ExtractValue
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import (
     RigidTransform,
@@ -22,7 +22,13 @@ from pydrake.math import (
 
 Array = NDArray[np.float64]
 
+FULL_TURN = 2.0 * math.pi
+"""The largest angle that a pose is written with [rad]."""
+
 _POSES = (RigidTransform, RigidTransform_[AutoDiffXd])
+_ANGLES = ("roll", "pitch", "yaw")
+_ORDER = "[roll, pitch, yaw, x, y, z] in rad and m"
+_BY_NAME = "cdpr_drake.pose(x=..., yaw_deg=...) takes them by name, angles in degrees"
 
 
 def numbers(a: ArrayLike) -> Array:
@@ -101,8 +107,75 @@ def vector_to_pose(pose: ArrayLike) -> RigidTransform:
 
 
 def as_pose(pose: RigidTransform | ArrayLike) -> RigidTransform:
-    """Return X_WP of a `pose` given as RigidTransform or as [roll, pitch, yaw, x, y, z]."""
-    return pose if isinstance(pose, _POSES) else vector_to_pose(pose)
+    """Return X_WP of a `pose` given as RigidTransform or as [roll, pitch, yaw, x, y, z] (rad, m).
+
+    This is for what people write. A state of a simulation goes through `vector_to_pose`: a platform
+    may turn further than anybody would write.
+
+    Raises:
+        ValueError: it is no such vector, or an angle is beyond a full turn, as when degrees were
+            given, or the position first.
+    """
+    if isinstance(pose, _POSES):
+        return pose
+    try:
+        vector = _six_numbers(pose)
+    except (TypeError, ValueError):
+        raise ValueError(f"a pose is six finite numbers {_ORDER}, got {pose}; {_BY_NAME}") from None
+    angles = _values(vector)[:3]
+    for name, angle in zip(_ANGLES, angles, strict=True):
+        if abs(angle) > FULL_TURN:
+            raise ValueError(
+                f"a pose is six finite numbers {_ORDER}, no angle beyond a full turn, 2 pi, "
+                f"got {name} = {angle:g} rad; {_BY_NAME}"
+            )
+    return vector_to_pose(vector)
+
+
+def pose(
+    *,
+    x: float = 0.0,
+    y: float = 0.0,
+    z: float = 0.0,
+    roll_deg: float = 0.0,
+    pitch_deg: float = 0.0,
+    yaw_deg: float = 0.0,
+) -> RigidTransform:
+    """Return X_WP of a position and of roll, pitch and yaw, Drake's extrinsic x-y-z angles.
+
+    Args:
+        x: [m] of the platform's origin in W.
+        y: [m] likewise.
+        z: [m] likewise, upwards.
+        roll_deg: [deg] about the x axis of W, turned first.
+        pitch_deg: [deg] about the y axis of W, turned second.
+        yaw_deg: [deg] about the z axis of W, turned last.
+
+    Raises:
+        ValueError: a value is not finite, or an angle is beyond a full turn, 360 degrees.
+    """
+    angles = {"roll_deg": roll_deg, "pitch_deg": pitch_deg, "yaw_deg": yaw_deg}
+    for name, value in {"x": x, "y": y, "z": z, **angles}.items():
+        if not math.isfinite(value):
+            raise ValueError(f"{name} must be finite, got {value}")
+        if name in angles and abs(value) > 360.0:
+            raise ValueError(f"{name} is no larger than a full turn, 360 degrees, got {value:g}")
+    return vector_to_pose([*(math.radians(a) for a in angles.values()), x, y, z])
+
+
+def _six_numbers(pose: ArrayLike) -> Array:
+    """Return `pose` as an array (6,) of float, or of AutoDiffXd if these are in it."""
+    array = np.asarray(pose)
+    if not any(isinstance(value, AutoDiffXd) for value in array.flat):
+        array = array.astype(float)
+    if array.shape != (6,) or not np.all(np.isfinite(_values(array))):
+        raise ValueError("not six finite numbers")
+    return array
+
+
+def _values(array: Array) -> Array:
+    """Return the values of an `array` (n,) of float or AutoDiffXd."""
+    return ExtractValue(array).ravel() if array.dtype == object else array
 
 
 def rpy_rate_matrix(rpy: ArrayLike) -> Array:

@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import GeometryError
 from cdpr_drake.model.arrays import RobotArrays
-from cdpr_drake.model.cable_models import cable_angles, cable_model_index
+from cdpr_drake.model.cable_models import cable_angles, cable_model_index, cable_model_name
 from cdpr_drake.model.kinematics import D_t, cable_geometry
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import (
@@ -98,7 +98,7 @@ class ServoSettings:
     model_drum_run: bool = False
 
     def __post_init__(self) -> None:
-        cable_model_index(self.cable_model)  # refuses an unknown one
+        object.__setattr__(self, "cable_model", cable_model_name(self.cable_model))
         if self.gain is not None and not (np.isfinite(self.gain) and self.gain > 0.0):
             raise ValueError(f"the gain must be positive and finite, got {self.gain} 1/s")
         if not (np.isfinite(self.ramp_time) and self.ramp_time >= 0.0):

@@ -23,7 +23,7 @@ from cdpr_drake.diagrams import (
     simulate,
 )
 from cdpr_drake.errors import CdprError
-from cdpr_drake.model.rotations import Array, as_pose, pose_to_vector
+from cdpr_drake.model.rotations import Array, pose_to_vector, vector_to_pose
 from cdpr_drake.model.servo import PoseErrorMap
 from cdpr_drake.runs.metrics import Summary, summarize
 from cdpr_drake.runs.reach import check_inverse_kinematics, check_pose
@@ -222,5 +222,5 @@ def _offset(setup: Setup, record: Record) -> Array:
     """Return (n, 3): p_WM minus that of the goal [m]."""
     X_PM = setup.robot.cameras.X_PM
     desired = (setup.goal @ X_PM).translation()
-    positions = [(as_pose(pose) @ X_PM).translation() for pose in record["pose"]]
+    positions = [(vector_to_pose(pose) @ X_PM).translation() for pose in record["pose"]]
     return np.array(positions) - desired

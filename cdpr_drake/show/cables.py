@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from cdpr_drake.model.catenary import cable_shape, elastic_catenary
 from cdpr_drake.model.kinematics import cable_ends
 from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.rotations import vector_to_pose
 
 SEGMENTS = 8
 """Straight bars that stand for a cable; the sag of one is 1/64 of the cable's."""
@@ -33,7 +34,7 @@ def cable_shapes(
     w, cable = robot.weight_per_metre, robot.cable
     shapes = np.empty((len(poses), robot.num_cables, points, 3))
     for shape, pose, length in zip(shapes, poses, lengths, strict=True):
-        ends = cable_ends(robot, pose)
+        ends = cable_ends(robot, vector_to_pose(pose))
         state = elastic_catenary(ends.chord, length, w, cable.stiffness, cable.drum_run)
         shape[:] = cable_shape(
             ends.p_WA,

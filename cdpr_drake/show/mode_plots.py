@@ -17,7 +17,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from cdpr_drake.analysis.stability import StabilityMap
 from cdpr_drake.model.kinematics import cable_ends
 from cdpr_drake.model.robot import CableRobot
-from cdpr_drake.model.rotations import as_pose, pose_to_vector
+from cdpr_drake.model.rotations import as_pose, pose_to_vector, vector_to_pose
 from cdpr_drake.model.signals import ERROR, POSE
 from cdpr_drake.show.plots import _figure, _legend_below, spread
 from cdpr_drake.show.style import REFERENCE, RUN_COLOURS, cable_colour
@@ -299,7 +299,7 @@ def _moved(
 ) -> np.ndarray:
     """Return where points of the platform (n, 3) are after a change of its pose (6,)."""
     if is_pose:
-        X = as_pose(pose_to_vector(X_WP) + change)
+        X = vector_to_pose(pose_to_vector(X_WP) + change)
     else:
         from pydrake.common.eigen_geometry import AngleAxis
 

@@ -21,6 +21,7 @@ from cdpr_drake.diagrams import Record
 from cdpr_drake.model.cable_models import sag
 from cdpr_drake.model.kinematics import cable_ends
 from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.rotations import as_pose, vector_to_pose
 from cdpr_drake.model.servo import pose_error
 from cdpr_drake.show.style import REFERENCE, cable_colour, run_styles
 
@@ -180,7 +181,7 @@ def cable_sag(record: Record, robot: CableRobot) -> np.ndarray:
         robot: the robot.
     """
     k, w = robot.num_cables, robot.weight_per_metre
-    p_AB = np.array([cable_ends(robot, pose).chord for pose in record["pose"]])
+    p_AB = np.array([cable_ends(robot, vector_to_pose(pose)).chord for pose in record["pose"]])
     Bx, Bz = np.hypot(p_AB[..., 0], p_AB[..., 1]), p_AB[..., 2]
     u_A = record["tangents_at_drawing_point"].reshape(-1, k, 3)
     H = record["tension_at_drawing_point"] * np.hypot(u_A[..., 0], u_A[..., 1])
@@ -209,8 +210,10 @@ def save_figures(
         goal: from which errors are taken; see `pose_error_figure`.
 
     Raises:
+        ValueError: the goal is no pose.
         OSError: a file cannot be written.
     """
+    goal = None if goal is None else as_pose(goal)
     folder = Path(directory)
     folder.mkdir(parents=True, exist_ok=True)
     figures = {
@@ -383,6 +386,7 @@ def _errors(
         if goal is not None:
             if robot is None:
                 raise ValueError("an error to a goal needs the robot, for its target frame")
-            s = np.array([pose_error(pose, goal, robot.cameras.X_PM) for pose in run["pose"]])
+            X_PM, poses = robot.cameras.X_PM, map(vector_to_pose, run["pose"])
+            s = np.array([pose_error(X_WP, goal, X_PM) for X_WP in poses])
         errors[label] = np.column_stack([1e3 * s[:, 3:], np.degrees(s[:, :3])])
     return errors

@@ -68,11 +68,12 @@ def write_replay(
         frames_per_second: recorded frames per second of playback.
 
     Raises:
-        ValueError: the record lacks a signal, or has no duration.
+        ValueError: the record lacks a signal, or has no duration; the goal is no pose.
         OSError: the file cannot be written.
     """
     others = others or {}
     _check(record, others)
+    goal = None if goal is None else as_pose(goal)
     pace = default_speed(record.time) if speed is None else speed
     frames = frame_times(record.time, pace, frames_per_second)
     index = nearest(record.time, frames)
@@ -88,7 +89,7 @@ def write_replay(
     _animate_colours(animation, tension_colours(tension, limits))
     if goal is not None:
         scene.draw_platform(meshcat, "/goal", robot, scene.GOAL, ghost=True)
-        meshcat.SetTransform("/goal", as_pose(goal))
+        meshcat.SetTransform("/goal", goal)
         entries.append(("goal", scene.GOAL))
     for number, (label, other) in enumerate(others.items(), start=1):
         colour = _add_other(meshcat, animation, robot, other, frames, number)
@@ -253,10 +254,10 @@ def _segment_path(cable: int, segment: int) -> str:
     return f"/run/cable{cable + 1}/{segment + 1}"
 
 
-def _errors(robot: CableRobot, poses: np.ndarray, goal: RigidTransform | ArrayLike) -> np.ndarray:
+def _errors(robot: CableRobot, poses: np.ndarray, goal: RigidTransform) -> np.ndarray:
     """Return distance [m] and angle [rad] (n, 2) of the target frame to the goal."""
     X_PM = robot.cameras.X_PM
-    s = np.array([pose_error(pose, goal, X_PM) for pose in poses])
+    s = np.array([pose_error(vector_to_pose(pose), goal, X_PM) for pose in poses])
     return np.column_stack([np.linalg.norm(s[:, 3:], axis=1), np.linalg.norm(s[:, :3], axis=1)])
 
 

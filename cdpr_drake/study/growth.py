@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from pydrake.systems.framework import Context, Diagram
 
 from cdpr_drake.diagrams import make_simulator
 from cdpr_drake.study.modes import DEADBEAT
@@ -38,8 +39,8 @@ class SimulatedMode:
 
 
 def simulate_modes(
-    diagram: Any,
-    context: Any,
+    diagram: Diagram,
+    context: Context,
     duration: float,
     *,
     which: Sequence[int] = (0,),
@@ -99,13 +100,13 @@ def _eigen(period_map: OnePeriodMap) -> tuple[Any, Any, Any]:
     return values[order], left[:, order], right[:, order]
 
 
-def _state(context: Any) -> Array:
+def _state(context: Context) -> Array:
     discrete = context.get_discrete_state()
     parts = [discrete.get_vector(g).CopyToVector() for g in range(discrete.num_groups())]
     return np.concatenate([context.get_continuous_state_vector().CopyToVector(), *parts])
 
 
-def _set_state(context: Any, state: Array) -> None:
+def _set_state(context: Context, state: Array) -> None:
     n = context.num_continuous_states()
     context.SetContinuousState(state[:n])
     for group in range(context.num_discrete_state_groups()):

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
+from cdpr_drake.model.cable_models import cable_model_name
 from cdpr_drake.model.inverse_kinematics import InverseKinematics
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, exp_rotation, pose_to_vector
@@ -41,7 +42,7 @@ class InverseKinematicsAngles(LeafSystem):
 
     def __init__(self, robot: CableRobot, cable_model: str = "SCMWE") -> None:
         super().__init__()
-        self.robot, self.cable_model = robot, cable_model
+        self.robot, self.cable_model = robot, cable_model_name(cable_model)
         self._inverse = InverseKinematics(robot, cable_model)
         winch = robot.winch
         self._zero, self._transmission = winch.encoder_zero_length, winch.transmission

@@ -6,6 +6,7 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from cdpr_drake.model.modelled import modelled_tangents, modelled_tensions
 from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.rotations import vector_to_pose
 from cdpr_drake.systems._template import finite_inputs
 
 
@@ -37,7 +38,7 @@ class ModelledTension(LeafSystem):
     def _calc(self, context: Context, output: BasicVector) -> None:
         pose = self._pose_port.Eval(context)
         finite_inputs(self, context, pose)
-        output.SetFromVector(modelled_tensions(self.robot, pose))
+        output.SetFromVector(modelled_tensions(self.robot, vector_to_pose(pose)))
 
 
 class ModelledTangents(LeafSystem):
@@ -71,4 +72,5 @@ class ModelledTangents(LeafSystem):
     def _calc(self, context: Context, output: BasicVector) -> None:
         pose, tension = self._pose_port.Eval(context), self._tension_port.Eval(context)
         finite_inputs(self, context, pose, tension)
-        output.SetFromVector(modelled_tangents(self.robot, pose, tension).ravel())
+        tangents = modelled_tangents(self.robot, vector_to_pose(pose), tension)
+        output.SetFromVector(tangents.ravel())
