@@ -9,7 +9,7 @@ import numpy as np
 
 from cdpr_drake.model.calibration_errors import CalibrationErrors, misjudged
 from cdpr_drake.model.rotations import Array
-from cdpr_drake.runs.running import Run, run, setup_of_test
+from cdpr_drake.runs import Run, run, setup_of_test
 from reproduction.section import Line, Panel, Result
 
 MAX_STEP = 0.02

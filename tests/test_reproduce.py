@@ -27,13 +27,13 @@ from reproduction import reproduce as machinery
 from reproduction.__main__ import main
 from reproduction.assumptions import printed
 from reproduction.null_models import chance_of_cables, chance_of_order, share, within
-from reproduction.paper_figures import panel_svg, paper_figure
+from reproduction.report.pictures import panel_svg, paper_figure
 from reproduction.registry import reproductions
-from reproduction.report import report_html
+from reproduction.report.page import report_html
 from reproduction.reproduce import report_of, reproduce
 from reproduction.section import Claim, Figure, Reproduction, kind_by
 from reproduction.traces import difference, rate, sizes
-from reproduction.words import count_of_claims, in_words
+from reproduction.report.words import count_of_claims, in_words
 
 ROOT = Path(__file__).resolve().parents[1]
 VOID = {"meta", "br", "hr", "img", "link", "input"}

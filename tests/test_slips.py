@@ -12,7 +12,7 @@ from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.servo import D_a, servo_twist
 from cdpr_drake.runs.paper_tests import paper_test
 from reproduction import cable_modes, slips
-from reproduction.printed_equations import (
+from reproduction.slips.printed_equations import (
     SLIPS,
     ecm,
     length_rates,

@@ -10,7 +10,7 @@ from cdpr_drake.runs import run, setup_of_test
 from reproduction import table5, table5_claims, table5_work
 from reproduction.assumptions import assumptions
 from reproduction.believed import Eyes, setup_from
-from reproduction.convergence import crossing_time, median_interval, noiseless_error
+from reproduction.table5.convergence import crossing_time, median_interval, noiseless_error
 
 
 def test_an_exponential_crosses_a_level_when_it_should():

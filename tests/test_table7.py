@@ -12,7 +12,7 @@ from cdpr_drake.model.robot import load_robot
 from cdpr_drake.model.servo import ServoSettings
 from reproduction import drag, table7, table7_variations
 from reproduction.assumptions import assumed, assumptions
-from reproduction.large_robot import (
+from reproduction.table7.large_robot import (
     GOAL,
     MODELS,
     START,
@@ -23,9 +23,9 @@ from reproduction.large_robot import (
     time_to,
     true_robot,
 )
-from reproduction.quasi_static import run_quasi_static
-from reproduction.table7_claims import ALONG, excursions, one_for_three
-from reproduction.table7_variations import slow_errors, variations, vary
+from reproduction.table7.quasi_static import run_quasi_static
+from reproduction.table7.claims import ALONG, excursions, one_for_three
+from reproduction.table7.variations import slow_errors, variations, vary
 
 
 @pytest.fixture(scope="module")

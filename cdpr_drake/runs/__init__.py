@@ -1,10 +1,20 @@
 """The paper's tests as data, and runs of them."""
 
 from cdpr_drake.runs.metrics import Summary
-from cdpr_drake.runs.paper_tests import PaperTest, paper_test
-from cdpr_drake.runs.running import Prepared, Run, Setup, prepare, run, setup_of_test
+from cdpr_drake.runs.paper_tests import NUMBERS, PaperTest, paper_test
+from cdpr_drake.runs.running import (
+    RECORD_PERIOD,
+    Prepared,
+    Run,
+    Setup,
+    prepare,
+    run,
+    setup_of_test,
+)
 
 __all__ = [
+    "NUMBERS",
+    "RECORD_PERIOD",
     "PaperTest",
     "Prepared",
     "Run",
