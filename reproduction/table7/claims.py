@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -11,15 +12,17 @@ from cdpr_drake.model.rotations import Array
 from reproduction.assumptions import assumptions, printed
 from reproduction.table7.large_robot import MODELS, final_errors, printed_errors, time_to
 from reproduction.null_models import chance_of_order, share, within
-from reproduction.section import Claim, Result
+from reproduction.section import Claim, Kind, Result
 from reproduction.table7.variations import SOFT, variations
+from reproduction.texts import Texts
+
+TEXTS = Texts("table7")
 
 FRACTIONS = (0.5, 1.0 / math.e, 0.1, 0.02)
 """Of the way that is left when a run counts as arrived, to compare models by."""
 
 WITHIN = 1.5
 """Ours and printed may differ by this factor."""
-
 
 FAST_RAMP = 1.0
 """Of the moves that start fast [s]."""
@@ -32,8 +35,6 @@ FARTHER = 5.0
 
 MORE = 1.1
 """A model overshoots more than another if it strays so many times as far."""
-
-SET = "linear_density, platform_scale, gain, target_angle, target_signs (fitted); drag (assumed)"
 
 SAGGING = MODELS[:3]
 
@@ -58,36 +59,29 @@ def claims(results: Mapping[str, Result]) -> tuple[Claim, ...]:
 def _orders(results: Mapping[str, Result], ours: Array) -> list[Claim]:
     theirs = printed_errors()
     every = varied_errors(results)
-    kept = [share(bool(np.all(np.diff(one[:, i]) > 0.0)) for one in every) for i in range(2)]
-    null = "ECM, CMWE and SCMWE as good as one another, in an order that hairs decide"
-    ranges = "the order is kept in {:.0f} % of the variations of these values"
+
+    def order(name: str, column: int, **numbers: Any) -> Claim:
+        return TEXTS.claim(
+            name,
+            agrees=np.all(np.diff(ours[:, column]) > 0.0),
+            kind="fitted",
+            null_rate=chance_of_order(len(SAGGING)),
+            theirs=theirs[:, column],
+            ours=ours[:, column],
+            kept=share(bool(np.all(np.diff(one[:, column]) > 0.0)) for one in every),
+            **numbers,
+        )
+
     return [
-        Claim(
-            text="final position errors: ECM < CMWE < SCMWE < SLSM",
-            printed=_listed(theirs[:, 0], 2, "mm"),
-            ours=_listed(ours[:, 0], 2, "mm"),
-            agrees=bool(np.all(np.diff(ours[:, 0]) > 0.0)),
-            kind="fitted",
-            null=null,
-            null_rate=chance_of_order(len(SAGGING)),
-            parameters=SET,
-            reason=f"{ranges.format(100.0 * kept[0])}; the first three lie closer together than "
-            f"printed: what the ECM has over the CMWE is elasticity, worth "
-            f"{_gap(results, 'none'):.2f} mm here, {_gap(results, 'soft'):.2f} mm at {SOFT:g} GPa "
-            f"and {theirs[1, 0] - theirs[0, 0]:.2f} mm in print, which no rope of steel gives",
+        order(
+            "position_order",
+            0,
+            gap=_gap(results, "none"),
+            soft_gap=_gap(results, "soft"),
+            soft=SOFT,
+            printed_gap=theirs[1, 0] - theirs[0, 0],
         ),
-        Claim(
-            text="final orientation errors: ECM < CMWE < SCMWE < SLSM",
-            printed=_listed(theirs[:, 1], 2, "°"),
-            ours=_listed(ours[:, 1], 4, "°"),
-            agrees=bool(np.all(np.diff(ours[:, 1]) > 0.0)),
-            kind="fitted",
-            null=null,
-            null_rate=chance_of_order(len(SAGGING)),
-            parameters=SET,
-            reason=f"{ranges.format(100.0 * kept[1])}; the first three differ by hairs, in an "
-            "order that target_signs was chosen for",
-        ),
+        order("orientation_order", 1),
     ]
 
 
@@ -97,16 +91,15 @@ def _farther_off(results: Mapping[str, Result], ours: Array) -> Claim:
 
     theirs = ratio(printed_errors())
     every = varied_errors(results)
-    return Claim(
-        text="SLSM ends much farther off than ECM",
-        printed=f"{theirs:.1f} times",
-        ours=f"{ratio(ours):.1f} times",
+    return TEXTS.claim(
+        "farther_off",
         agrees=within(ratio(ours), theirs, WITHIN),
         kind="fitted",
-        null=f"the variations of single values to either end of their ranges; {len(every)} of them",
         null_rate=share(within(ratio(one), theirs, WITHIN) for one in every),
-        parameters=SET,
-        reason=f"within a factor of {WITHIN:g}, either way",
+        theirs=theirs,
+        ours=ratio(ours),
+        variations=len(every),
+        within=WITHIN,
     )
 
 
@@ -123,20 +116,19 @@ def one_for_three() -> Array:
 def _eight_errors(results: Mapping[str, Result], ours: Array) -> Claim:
     ratio, fast = (_factors(errors) for errors in (ours, errors_of(results, "fast")))
     single = one_for_three()
-    better = "resolves" if np.all(ratio < single) else "is no nearer: it resolves nothing among"
-    return Claim(
-        text="the eight printed errors",
-        printed="position and orientation, four models",
-        ours=f"within a factor of {ratio[0]:.3f} and {ratio[1]:.3f}",
-        agrees=bool(ratio.max() <= WITHIN),
+    resolution = TEXTS.words("resolution")
+    return TEXTS.claim(
+        "eight_errors",
+        agrees=ratio.max() <= WITHIN,
         kind="fitted",
-        null="ECM = CMWE = SCMWE, the best single value for the three, and the SLSM's own: within "
-        f"{single[0]:.3f} and {single[1]:.3f}",
         null_rate=share([single.max() <= WITHIN]),
-        parameters=SET,
-        reason=f"held to {WITHIN:g}; the fit {better} ECM, CMWE and SCMWE; from a coarse start it "
-        f"comes to the values of the file within {100 * _set_spread(results):.1f} %. With a ramp "
-        f"of {FAST_RAMP:g} s and nothing fitted anew: {fast[0]:.2f} and {fast[1]:.2f}",
+        ours=ratio,
+        single=single,
+        within=WITHIN,
+        resolves=resolution["nearer" if np.all(ratio < single) else "not nearer"],
+        spread=_set_spread(results),
+        ramp=FAST_RAMP,
+        fast=fast,
     )
 
 
@@ -146,33 +138,29 @@ def _factors(errors: Array) -> Array:
     return factors
 
 
-def _excursions(results: Mapping[str, Result]) -> list[Claim]:
+def _excursions(results: Mapping[str, Result]) -> tuple[Claim, ...]:
     """Return the claims on excursions, with the ramp assumed and with a fast one."""
-    ramps = {"move": assumptions("table7")["ramp_time"].value, "fast": FAST_RAMP}
-    most = {kind: _times_as_far(results, kind) for kind in ramps}
-    chosen = "the ramp that was assumed, or the fast one"
-    nulls = {
-        "move": (chosen, share(times >= FARTHER for times in most.values())),
-        "fast": ("any one of the four models strays the farthest", 1.0 / len(MODELS)),
-    }
-    found = []
-    for kind, ramp in ramps.items():
-        strays = {m: excursions(results[f"{kind}_{m}"]) for m in MODELS}
-        found.append(
-            Claim(
-                text=f"SLSM makes excursions, the others hardly: ramp of {ramp:g} s",
-                printed="overshoots, especially with the SLSM",
-                ours=", ".join(f"{m} {z:.0f} mm, {turn:.2f}°" for m, (z, turn) in strays.items())
-                + f"; SLSM at least {most[kind]:.1f} times as far",
-                agrees=most[kind] >= FARTHER,
-                kind="fitted" if kind == "move" else "tested",
-                null=nulls[kind][0],
-                null_rate=nulls[kind][1],
-                parameters=f"{SET}; ramp_time (chosen, or else the ECM swings, too)",
-                reason=f"in z and in orientation; held to {FARTHER:g} times each of the others",
-            )
+    most = {kind: _times_as_far(results, kind) for kind in ("move", "fast")}
+
+    def one(name: str, run: str, kind: Kind, null_rate: float, ramp: float) -> Claim:
+        strays = {m: excursions(results[f"{run}_{m}"]) for m in MODELS}
+        return TEXTS.claim(
+            name,
+            agrees=most[run] >= FARTHER,
+            kind=kind,
+            null_rate=null_rate,
+            ramp=ramp,
+            strays={m: f"{z:.0f} mm, {turn:.2f}°" for m, (z, turn) in strays.items()},
+            times=most[run],
+            farther=FARTHER,
         )
-    return found
+
+    assumed = assumptions("table7")["ramp_time"].value
+    by_ramp = share(times >= FARTHER for times in most.values())
+    return (
+        one("excursions_move", "move", "fitted", by_ramp, assumed),
+        one("excursions_fast", "fast", "tested", 1.0 / len(MODELS), FAST_RAMP),
+    )
 
 
 def _sagging_overshoot(results: Mapping[str, Result]) -> Claim:
@@ -183,17 +171,15 @@ def _sagging_overshoot(results: Mapping[str, Result]) -> Claim:
         return max(ours[0] / ecm[0], ours[1] / ecm[1])
 
     slow, fast = ([ratio(kind, m) for m in SAGGING[1:]] for kind in ("move", "fast"))
-    return Claim(
-        text="CMWE and SCMWE overshoot, too, the ECM does not",
-        printed="overshoots in some curves of Fig. 16",
-        ours=f"they stray {slow[0]:.2f} and {slow[1]:.2f} times as far as the ECM, after a ramp of "
-        f"{FAST_RAMP:g} s {fast[0]:.2f} and {fast[1]:.2f} times",
+    return TEXTS.claim(
+        "sagging_overshoot",
         agrees=min(slow) >= MORE,
         kind="tested",
-        null="any one of these three strays the least",
         null_rate=1.0 / len(SAGGING),
-        parameters=f"{SET}; ramp_time (chosen)",
-        reason=f"in z or in orientation, where it is more; held to at least {MORE:g} times",
+        slow=slow,
+        ramp=FAST_RAMP,
+        fast=fast,
+        more=MORE,
     )
 
 
@@ -205,21 +191,16 @@ def _times_as_far(results: Mapping[str, Result], kind: str) -> float:
 
 
 def _converges_before(results: Mapping[str, Result]) -> Claim:
-    lags = [fraction_of(results, m, t) for m, t in zip(SAGGING, printed_delta_t(), strict=True)]
+    theirs = printed_delta_t()
     first = [delta_t(results, m, f) for m in SAGGING for f in FRACTIONS]
-    return Claim(
-        text="ECM, CMWE and SCMWE converge before SLSM",
-        printed=_listed(printed_delta_t(), 2, "s"),
-        ours=f"{max(first):.1f} to {min(first):.1f} s",
+    return TEXTS.claim(
+        "converges_before",
         agrees=max(first) < 0.0,
         kind="fitted",
-        null="the three, as good as one another, before or after the SLSM",
         null_rate=chance_of_order(2),
-        parameters=f"{SET}; what is left at arrival",
-        reason="the sign follows from the final errors, which were fitted; the lag grows all the "
-        "way; ours are the printed ones where "
-        + ", ".join(f"{100 * f:.0f}" for f in lags)
-        + " % of the way are left. When a run counts as arrived is not printed",
+        theirs=theirs,
+        first=(max(first), min(first)),
+        lags=[fraction_of(results, m, t) for m, t in zip(SAGGING, theirs, strict=True)],
     )
 
 
@@ -298,7 +279,3 @@ def _gap(results: Mapping[str, Result], key: str) -> float:
     """Return how much farther off the CMWE ends than the ECM in a variation [mm]."""
     errors = np.asarray(results[f"vary_{key}"]["errors"])
     return float(errors[1, 0] - errors[0, 0])
-
-
-def _listed(values: Sequence[float] | Array, digits: int, unit: str) -> str:
-    return ", ".join(f"{v:.{digits}f}" for v in values) + f" {unit}"

@@ -30,28 +30,25 @@ POINTS = CalibrationErrors(
 FRAMES = CalibrationErrors(drawing_points=0.0, attachment_points=0.0)
 
 
-def variations() -> dict[str, tuple[str, dict[str, Any]]]:
-    """Return what is varied, by key: a text, and the values that change.
+def variations() -> dict[str, dict[str, Any]]:
+    """Return the values that change, by the key of what is varied.
 
     Each value of the file of assumptions goes to either end of its range; the rest is other than
     these. A calibration error is one random draw, in place of the target frame's.
     """
-    varied: dict[str, tuple[str, dict[str, Any]]] = {"none": ("as assumed", {})}
+    varied: dict[str, dict[str, Any]] = {"none": {}}
     for name, entry in assumptions("table7").items():
         if name in WITHOUT_PART:
             continue
         for end, value in (("low", entry.low), ("high", entry.high)):
             if value != entry.value:
-                unit = "" if entry.unit == "-" else f" {entry.unit}"
-                varied[f"{name}_{end}"] = (f"{name} {value:g}{unit}", {name: value})
-    points = f"{1e3 * POINTS.drawing_points:g}, {1e3 * POINTS.attachment_points:g} mm"
-    angle = f"{np.degrees(FRAMES.camera_angle):g} deg"
+                varied[f"{name}_{end}"] = {name: value}
     return varied | {
-        "soft": (f"modulus {SOFT:g} GPa, out of its range", {"modulus": SOFT}),
-        "light": (f"controller: cable {100 * (1 - LIGHTER):.0f} % lighter", {"lighter": LIGHTER}),
-        "points": (f"controller: A, B off by {points} (1 sigma)", {"calibration": POINTS}),
-        "frames": (f"controller: frames off by {angle} (1 sigma)", {"calibration": FRAMES}),
-        "centred": ("tensions in the middle of their limits", {"tensions": "within limits"}),
+        "soft": {"modulus": SOFT},
+        "light": {"lighter": LIGHTER},
+        "points": {"calibration": POINTS},
+        "frames": {"calibration": FRAMES},
+        "centred": {"tensions": "within limits"},
     }
 
 
@@ -64,7 +61,7 @@ def vary(key: str) -> Result:
         key: of `variations`.
     """
     try:
-        return {"errors": slow_errors(assumed("table7") | variations()[key][1]), "failed": ""}
+        return {"errors": slow_errors(assumed("table7") | variations()[key]), "failed": ""}
     except CdprError as error:
         return {"errors": np.full((len(MODELS), 2), np.nan), "failed": str(error)}
 

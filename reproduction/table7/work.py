@@ -1,8 +1,6 @@
-"""Table 7 and Fig. 16: 20 m across a room of 75 x 98 x 38.9 m with four cable models."""
+"""The work behind Table 7 and Fig. 16: simulations of the move, and a fit without dynamics."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -10,31 +8,13 @@ from pydrake.math import RigidTransform
 from cdpr_drake.model.rotations import Array, as_pose
 from cdpr_drake.study import excursion
 from reproduction.assumptions import assumed, assumptions
+from reproduction.section import Result
 from reproduction.table7.drag import run_with_drag, what_it_takes
-from reproduction.table7.large_robot import GOAL, MODELS, printed_errors, setup_of_move, true_robot
-from reproduction.section import Case, Result
-from reproduction.table7.claims import ALONG, FAST_RAMP
-from reproduction.table7.section import section
-from reproduction.table7.variations import slow_errors, variations, vary
-
-__all__ = ["cases", "fit", "move", "name", "section"]
-
-name = "table7"
+from reproduction.table7.large_robot import GOAL, printed_errors, setup_of_move, true_robot
+from reproduction.table7.variations import slow_errors
 
 COARSE = {"linear_density": 0.065, "platform_scale": 1.01, "gain": 0.0594, "target_angle": 0.1}
 """Where the fit starts: CoGiRo's cable and platform, the gain that Table 7 implies, 0.1 degrees."""
-
-
-def cases() -> Sequence[Case]:
-    """Return four simulations, four that start fast, the fit, variations, and places on the way."""
-    moves = [Case(key=f"move_{m}", function=move, arguments={"cable_model": m}) for m in MODELS]
-    fast = [
-        Case(key=f"fast_{m}", function=move, arguments={"cable_model": m, "ramp_time": FAST_RAMP})
-        for m in MODELS
-    ]
-    varied = [Case(key=f"vary_{k}", function=vary, arguments={"key": k}) for k in variations()]
-    stable = [Case(key=f"stable_{x}", function=stability, arguments={"x": float(x)}) for x in ALONG]
-    return [*moves, *fast, Case(key="fit", function=fit), *varied, *stable]
 
 
 def stability(x: float) -> Result:
@@ -43,7 +23,7 @@ def stability(x: float) -> Result:
     Args:
         x: of the goal [m], which is level with START and GOAL.
     """
-    values = assumed(name)
+    values = assumed("table7")
     return what_it_takes(true_robot(values), RigidTransform([x, 0.0, 0.0]), values["gain"])
 
 
@@ -61,7 +41,7 @@ def move(cable_model: str, ramp_time: float | None = None) -> Result:
         cable_model: the controller's.
         ramp_time: in place of that assumed [s].
     """
-    values = assumed(name)
+    values = assumed("table7")
     if ramp_time is not None:
         values["ramp_time"] = ramp_time
     setup = setup_of_move(values, cable_model)
@@ -89,7 +69,7 @@ def fit() -> Result:
     """
     from scipy.optimize import least_squares
 
-    given, values = assumptions(name), assumed(name)
+    given, values = assumptions("table7"), assumed("table7")
     low, high = (np.log([getattr(given[n], end) + 1e-3 for n in COARSE]) for end in ("low", "high"))
     theirs = printed_errors()
 
