@@ -1,4 +1,4 @@
-"""Figure 16: errors and velocities of the 98 m robot with four cable models."""
+"""Figure 16: the runs of Table 7 as lines, and the section of the report."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from cdpr_drake.model.rotations import Array
-from reproduction.table7.large_robot import MODELS
 from reproduction.section import Case, Claim, Figure, Line, Panel, Result, Section
+from reproduction.table7.large_robot import MODELS
 from reproduction.table7.work import move
-from reproduction.table7.claims import SET
+from reproduction.texts import Texts
 from reproduction.traces import error_panels, velocity_panel
 
 name = "figure16"
+
+TEXTS = Texts(name)
 
 SWUNG = 20.0
 """By then the swing of the start has died away [s]."""
@@ -31,27 +33,14 @@ def section(results: Mapping[str, Result]) -> Section:
         results: of all cases, by their keys.
     """
     lines = {model: _lines(results[model]) for model in MODELS}
-    return Section(
-        name=name,
-        title="Figure 16: the 75 x 98 x 38.9 m robot with four cable models",
-        text=(
-            "The runs of Table 7: a move of 20 m along x, 105 s. Rows by model, and the errors "
-            "that should stay zero once more, larger.",
-        ),
-        figures=(
-            Figure(
-                title="Errors and velocities with ECM, CMWE, SCMWE and SLSM",
-                panels=tuple(
-                    (*error_panels({"": result}, model), velocity_panel({"": result}, model))
-                    for model, result in lines.items()
-                ),
-            ),
-            _strays(lines),
-        ),
-        claims=(
-            _turns_away(lines),
-            _overshoots_fade(results),
-        ),
+    panels = [
+        (*error_panels({"": result}, model), velocity_panel({"": result}, model))
+        for model, result in lines.items()
+    ]
+    return TEXTS.section(
+        name,
+        figures=(TEXTS.figure("errors", panels), _strays(lines)),
+        claims=(_turns_away(lines), _overshoots_fade(results)),
     )
 
 
@@ -60,39 +49,24 @@ def _turns_away(lines: Mapping[str, Result]) -> Claim:
     for model, result in lines.items():
         turn = np.linalg.norm(result["error"][:, 3:], axis=1)
         growth[model] = float(turn[np.asarray(result["time"]) > SWUNG].max() / turn[0])
-    return Claim(
-        text="with the SLSM the platform does not turn in the desired direction at first",
-        printed="overshoots, especially with the SLSM",
-        ours="largest orientation error later on over that at the start: "
-        + ", ".join(f"{model} {ratio:.2f}" for model, ratio in growth.items()),
+    return TEXTS.claim(
+        "turns_away",
         agrees=growth["SLSM"] > 1.0 > max(growth[model] for model in MODELS[:3]),
         kind="fitted",
-        null="any one of the four models alone does",
         null_rate=1.0 / len(MODELS),
-        parameters=SET,
-        reason=f"as the controller sees it, after {SWUNG:g} s; the SLSM's orientation error at the "
-        "end was fitted",
+        growth=growth,
+        swung=SWUNG,
     )
 
 
 def _overshoots_fade(results: Mapping[str, Result]) -> Claim:
-    largest, last = [], []
-    for model in MODELS:
-        z = 1e3 * np.abs(np.asarray(results[model]["position_error"])[:, 2])
-        largest.append(float(z.max()))
-        last.append(float(z[-1]))
-    return Claim(
-        text="overshoots are gradually reduced",
-        printed="gradually, by the robustness of VBC",
-        ours="largest error in z "
-        + ", ".join(f"{m} {a:.1f}" for m, a in zip(MODELS, largest, strict=True))
-        + " mm; at the end "
-        + ", ".join(f"{b:.1f}" for b in last),
-        agrees=all(b < 0.5 * a for a, b in zip(largest, last, strict=True)),
+    z = {m: 1e3 * np.abs(np.asarray(results[m]["position_error"])[:, 2]) for m in MODELS}
+    return TEXTS.claim(
+        "overshoots_fade",
+        agrees=all(error[-1] < 0.5 * error.max() for error in z.values()),
         kind="by construction",
-        null="nothing: with the drag assumed the loop is stable, and all its errors decay",
-        parameters=SET,
-        reason="held to less than half of the largest",
+        largest={model: error.max() for model, error in z.items()},
+        last=[error[-1] for error in z.values()],
     )
 
 
@@ -107,25 +81,20 @@ def _lines(result: Result) -> Result:
 
 
 def _strays(lines: Mapping[str, Result]) -> Figure:
-    def panel(title: str, label: str, values: Mapping[str, Array]) -> Panel:
-        return Panel(
-            title=title,
-            y_label=label,
-            lines=tuple(
-                Line(label=model, x=lines[model]["time"], y=y, colour=i, dash=i)
-                for i, (model, y) in enumerate(values.items())
-            ),
-        )
-
     errors = {model: np.asarray(result["error"]) for model, result in lines.items()}
-    turns = {model: np.linalg.norm(e[:, 3:], axis=1) for model, e in errors.items()}
-    return Figure(
-        title="What should stay zero",
-        panels=(
-            (
-                panel("$t_y$", "position error [mm]", {m: e[:, 1] for m, e in errors.items()}),
-                panel("$t_z$", "position error [mm]", {m: e[:, 2] for m, e in errors.items()}),
-                panel("orientation", "norm of $θu$ [deg]", turns),
-            ),
-        ),
+
+    def panel(title: str, label: str, values: Mapping[str, Array]) -> Panel:
+        drawn = tuple(
+            Line(label=model, x=lines[model]["time"], y=y, colour=i, dash=i)
+            for i, (model, y) in enumerate(values.items())
+        )
+        return Panel(title=title, y_label=label, lines=drawn)
+
+    y, z = ({model: error[:, axis] for model, error in errors.items()} for axis in (1, 2))
+    turns = {model: np.linalg.norm(error[:, 3:], axis=1) for model, error in errors.items()}
+    row = (
+        panel("$t_y$", "position error [mm]", y),
+        panel("$t_z$", "position error [mm]", z),
+        panel("orientation", "norm of $θu$ [deg]", turns),
     )
+    return TEXTS.figure("strays", (row,))

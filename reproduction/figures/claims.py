@@ -8,11 +8,14 @@ import numpy as np
 
 from cdpr_drake.model.rotations import Array
 from cdpr_drake.runs import NUMBERS, paper_test
-from reproduction import poses
 from reproduction.assumptions import printed
+from reproduction.figures import poses
 from reproduction.null_models import chance_of_cables, chance_of_order, share
 from reproduction.section import Claim, Result
+from reproduction.texts import Texts
 from reproduction.traces import difference, rate, sizes
+
+TEXTS = Texts("figures")
 
 RATE_TOLERANCE = 0.05
 """A decay is exponential if the rate that fits it is λ to this part."""
@@ -22,7 +25,6 @@ ROUNDED = (0.01, float(np.degrees(0.01)))
 
 CLOSE = 0.05
 """Two runs are similar if they are never farther apart than this part of the move."""
-
 
 SMALL = (0.0, 5.0)
 """What a small but not vanishing dbeta is between [deg]."""
@@ -65,16 +67,17 @@ def _amplitude(number: int) -> Claim:
     def is_printed(distance: float, angle: float) -> bool:
         return abs(distance - metres) <= ROUNDED[0] and abs(angle - degrees) <= ROUNDED[1]
 
-    return Claim(
-        text=f"Test {number} moves by",
-        printed=f"{metres} m, {degrees}°",
-        ours=f"{distance:.2f} m, {angle:.1f}°",
+    return TEXTS.claim(
+        "amplitude",
         agrees=is_printed(distance, angle),
         kind="by construction",
-        null="the poses of any of the tests; both sides are printed",
         null_rate=share(is_printed(*_move(n)) for n in NUMBERS),
-        reason=f"from the printed poses, which are rounded to {ROUNDED[0]:g} m and "
-        f"{ROUNDED[1]:.1f}°",
+        number=number,
+        metres=metres,
+        degrees=degrees,
+        distance=distance,
+        angle=angle,
+        rounded=ROUNDED,
     )
 
 
@@ -89,19 +92,15 @@ def _move(number: int) -> tuple[float, float]:
 def _exponential(number: int, runs: Mapping[str, Result]) -> Claim:
     gain = next(iter(runs.values()))["gain"]
     rates = {name: rate(result) for name, result in runs.items()}
-    final = max(float(np.mean(sizes(r)[-10:, 0])) for r in runs.values())
-    return Claim(
-        text="Cartesian errors converge exponentially to small ones",
-        printed="exponentially",
-        ours=", ".join(f"{name} {r:.4f} 1/s".strip() for name, r in rates.items())
-        + f" for λ = {gain:g} 1/s; {final:.1f} mm seen at the end",
+    return TEXTS.claim(
+        "exponential",
         agrees=all(abs(r / gain - 1.0) < RATE_TOLERANCE for r in rates.values()),
         kind="by construction",
-        null="any gain, cable model and pose of the tests: what was put in is read off again, at "
-        "the rates of the gain matrix",
         null_rate=poses.share_of_rates(RATE_TOLERANCE),
-        parameters="gain",
-        reason=f"λ: {_source_of_gain(number)}",
+        rates=rates,
+        gain=gain,
+        final=max(float(np.mean(sizes(r)[-10:, 0])) for r in runs.values()),
+        source=_source_of_gain(number),
     )
 
 
@@ -117,45 +116,38 @@ def _least_tensed(result: Result) -> Claim:
     theirs = printed("figures")["least_tensed_test_1"].value
     tension, dbeta = np.mean(result["tension"], axis=0), np.mean(result["dbeta"], axis=0)
     least, most = _first(tension, len(theirs)), _first(-dbeta, len(theirs))
-    return Claim(
-        text="the least tensed cables, whose dβ are the largest, in Test 1",
-        printed=_cables(theirs),
-        ours=f"{_cables(least)}; largest dβ: {_cables(most)}",
+    return TEXTS.claim(
+        "least_tensed",
         agrees=least == theirs and most == theirs,
         kind="tested",
-        null="the two cables of any post",
         null_rate=chance_of_cables(theirs),
-        parameters="the camera's place, the centre of mass (assumed)",
-        reason="means over the run; that dβ is largest where a cable is least tensed follows",
+        theirs=theirs,
+        least=least,
+        most=most,
     )
 
 
 def _less_tensed_than_loaded(results: Mapping[str, Result]) -> Claim:
     means = [np.mean(results[key(n, "SCMWE", "robot")]["tension"]) for n in (1, 2, 3)]
-    return Claim(
-        text="tensions are smaller in Test 3, with less mass",
-        printed="smaller than in Tests 1 and 2",
-        ours=", ".join(f"{mean:.0f} N" for mean in means) + " on mean in Tests 1, 2, 3",
-        agrees=bool(means[2] < min(means[:2])),
+    return TEXTS.claim(
+        "less_tensed",
+        agrees=means[2] < min(means[:2]),
         kind="by construction",
-        null="any pose of the tests, with and without the payload, at rest",
         null_rate=poses.share_less_tensed(),
-        parameters="none but the masses, which are printed",
+        means=means,
     )
 
 
 def _sag(result: Result) -> Claim:
     low, high = np.min(result["dbeta"]), np.max(result["dbeta"])
-    return Claim(
-        text="dβ are small but not zero",
-        printed="small",
-        ours=f"{low:.2f}° to {high:.2f}°",
-        agrees=bool(low > SMALL[0] and high < SMALL[1]),
+    return TEXTS.claim(
+        "sag",
+        agrees=low > SMALL[0] and high < SMALL[1],
         kind="by construction",
-        null="any pose of the tests, with and without the payload, at rest",
         null_rate=poses.share_of_sag(*SMALL),
-        parameters="what counts as small (chosen)",
-        reason=f"more than {SMALL[0]:g}° and less than {SMALL[1]:g}°",
+        low=low,
+        high=high,
+        small=SMALL,
     )
 
 
@@ -181,20 +173,15 @@ def similar(number: int, results: Mapping[str, Result], models: Sequence[str]) -
         models: of the law.
     """
     apart = {
-        model: difference(
-            results[key(number, model, "robot")], results[key(number, model, "simulator")]
-        )
+        model: difference(*(results[key(number, model, where)] for where in ("robot", "simulator")))
         for model in models
     }
-    return Claim(
-        text=f"Cartesian errors of Test {number} in simulation and experiment",
-        printed="correspond well",
-        ours=", ".join(f"{m}: at most {100 * a:.1f} % of the move apart" for m, a in apart.items()),
+    return TEXTS.claim(
+        "similar",
         agrees=max(apart.values()) < CLOSE,
         kind="by construction",
-        null="nothing: both are simulations here, of one model",
-        parameters="noise, calibration errors (assumed)",
-        reason="this shows what noise and calibration change",
+        number=number,
+        apart={f"{model}: at most": a for model, a in apart.items()},
     )
 
 
@@ -214,28 +201,20 @@ def claims_of_15(results: Mapping[str, Result]) -> list[Claim]:
     return [
         similar(2, results, ("SCMWE",)),
         similar(3, results, ("SCMWE",)),
-        Claim(
-            text="the most tensed cables in Test 2, in simulation and experiment",
-            printed=_cables(theirs),
-            ours="; ".join(f"{place}: {_cables(found)}" for place, found in most.items()),
+        TEXTS.claim(
+            "most_tensed",
             agrees=all(found == theirs for found in most.values()),
             kind="tested",
-            null="the four cables of any two posts",
             null_rate=chance_of_cables(theirs),
-            parameters="the camera's place, the centre of mass (assumed)",
-            reason="means over the run; robot and simulator are one model, and counted once",
+            theirs=theirs,
+            most=most,
         ),
-        Claim(
-            text="tensions are larger in the experiments than in simulation",
-            printed="on overall larger",
-            ours=f"{ratio:.2f} times on mean in Test 2",
+        TEXTS.claim(
+            "larger_in_experiments",
             agrees=ratio > 1.05,
             kind="tested",
-            null="either of the two is larger",
             null_rate=chance_of_order(2),
-            parameters="noise, calibration errors (assumed)",
-            reason="the paper attributes it to friction at winches and eyelets, which both of our "
-            "settings leave out",
+            ratio=ratio,
         ),
     ]
 
@@ -243,7 +222,3 @@ def claims_of_15(results: Mapping[str, Result]) -> list[Claim]:
 def _first(values: Array, count: int) -> list[int]:
     """Return the cables of the lowest values, in the order of their numbers from 1."""
     return sorted(int(i) + 1 for i in np.argsort(values)[:count])
-
-
-def _cables(numbers: Sequence[int]) -> str:
-    return "cables " + ", ".join(map(str, numbers))
