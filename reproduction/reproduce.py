@@ -16,8 +16,7 @@ import numpy as np
 
 from cdpr_drake import __version__
 from cdpr_drake.analysis import StepWarning
-from cdpr_drake.batch import Sweep, sweep
-from cdpr_drake.batch import plain
+from cdpr_drake.batch import Sweep, plain, sweep
 from reproduction.assumptions import Assumption, assumptions
 from reproduction.section import Case, Reproduction, Result, Section
 from reproduction.sources import source_of

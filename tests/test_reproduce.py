@@ -22,18 +22,21 @@ from conftest import find_chromium
 from fake_paper import FakeTable
 
 from cdpr_drake.batch.store import fingerprint, name_of
-from reproduction import figures, figures_claims, poses, sources
 from reproduction import reproduce as machinery
+from reproduction import sources
 from reproduction.__main__ import main
 from reproduction.assumptions import printed
+from reproduction.figures import claims as figures_claims
+from reproduction.figures import poses
+from reproduction.figures import section as figures
 from reproduction.null_models import chance_of_cables, chance_of_order, share, within
-from reproduction.report.pictures import panel_svg, paper_figure
 from reproduction.registry import reproductions
 from reproduction.report.page import report_html
+from reproduction.report.pictures import panel_svg, paper_figure
+from reproduction.report.words import count_of_claims, in_words
 from reproduction.reproduce import report_of, reproduce
 from reproduction.section import Claim, Figure, Reproduction, kind_by
 from reproduction.traces import difference, rate, sizes
-from reproduction.report.words import count_of_claims, in_words
 
 ROOT = Path(__file__).resolve().parents[1]
 VOID = {"meta", "br", "hr", "img", "link", "input"}

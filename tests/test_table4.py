@@ -9,9 +9,10 @@ from cdpr_drake.analysis import gain_matrix
 from cdpr_drake.model.cable_models import CABLE_MODELS
 from cdpr_drake.runs import setup_of_test
 from cdpr_drake.study import equilibrium
-from reproduction import explanations as e
-from reproduction import table4, table4_work
 from reproduction.assumptions import assumptions, printed
+from reproduction.table4 import explanations as e
+from reproduction.table4 import section as table4
+from reproduction.table4 import work as table4_work
 from reproduction.table4.structure import Structure, joint_space_end
 
 ROOT = Path(__file__).resolve().parents[1]

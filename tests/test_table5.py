@@ -7,9 +7,11 @@ import pytest
 from scipy.stats import binom
 
 from cdpr_drake.runs import run, setup_of_test
-from reproduction import table5, table5_claims, table5_work
 from reproduction.assumptions import assumptions
 from reproduction.believed import Eyes, setup_from
+from reproduction.table5 import claims as table5_claims
+from reproduction.table5 import section as table5
+from reproduction.table5 import work as table5_work
 from reproduction.table5.convergence import crossing_time, median_interval, noiseless_error
 
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from cdpr_drake.model.robot import load_robot
-from reproduction import table6, table6_work
 from reproduction.assumptions import assumptions
+from reproduction.table6 import section as table6
+from reproduction.table6 import work as table6_work
 from reproduction.table6.sag_search import NAMES, ScaledRobots, search
 
 RANGES = {

@@ -7,11 +7,11 @@ import functools
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake import CableRobot, load_robot
 from cdpr_drake.analysis import gain_matrix
 from cdpr_drake.model.cable_models import CABLE_MODELS, cable_angles
 from cdpr_drake.model.equilibrium import rest_state
 from cdpr_drake.model.kinematics import cable_geometry
-from cdpr_drake import CableRobot, load_robot
 from cdpr_drake.model.rotations import Array
 from cdpr_drake.runs import NUMBERS, paper_test
 from reproduction.null_models import share

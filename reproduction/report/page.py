@@ -8,7 +8,6 @@ from importlib import resources
 from typing import Any
 
 from reproduction.report.pictures import panel_svg
-from reproduction.section import Figure
 from reproduction.report.words import (
     count_of_claims,
     fitted_and_assumed,
@@ -17,6 +16,7 @@ from reproduction.report.words import (
     verdict,
     what_else,
 )
+from reproduction.section import Figure
 
 
 def report_html(report: Mapping[str, Any], figures: Mapping[str, Sequence[Figure]]) -> str:
@@ -26,7 +26,7 @@ def report_html(report: Mapping[str, Any], figures: Mapping[str, Sequence[Figure
         report: as `report_of` gives it.
         figures: of the sections, by their names.
     """
-    style = resources.files("reproduction") / "report.css"
+    style = resources.files(__package__) / "page.css"
     sections = report["sections"]
     return "\n".join(
         [
@@ -58,7 +58,7 @@ def _head(report: Mapping[str, Any]) -> Iterable[str]:
     made = (
         f"Made {report['made']} with cdpr_drake {report['cdpr_drake']} and Drake "
         f"{report['drake']} in {report['cpu_time_s'] / 60.0:.1f} minutes of processor time by "
-        "<code>cdpr-drake reproduce</code>."
+        "<code>make reproduce</code>."
     )
     return [
         "<header>",

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cdpr_drake.show.plots import number_cables
-from cdpr_drake.show.style import REFERENCE, RUN_COLOURS, RUN_DASHES, cable_colour
+from cdpr_drake.show import number_cables, style
 from reproduction.section import Figure as PaperFigure
 from reproduction.section import Panel
 
@@ -81,11 +80,11 @@ def _draw(axes: Any, panel: Panel) -> None:
             np.asarray(line.x),
             np.asarray(line.y),
             linewidth=1.2,
-            color=cable_colour(line.colour) if of_cables else _run_colour(line.colour),
-            linestyle=RUN_DASHES[line.dash % len(RUN_DASHES)],
+            color=style.cable_colour(line.colour) if of_cables else _run_colour(line.colour),
+            linestyle=style.RUN_DASHES[line.dash % len(style.RUN_DASHES)],
             label=line.label or None,
         )
-    axes.axhline(0.0, color=REFERENCE, linewidth=0.8, zorder=0)
+    axes.axhline(0.0, color=style.REFERENCE, linewidth=0.8, zorder=0)
     axes.grid(True, color="0.85", linewidth=0.6)
     axes.set_axisbelow(True)
     axes.margins(x=0.01)
@@ -101,4 +100,4 @@ def _draw(axes: Any, panel: Panel) -> None:
 
 
 def _run_colour(index: int) -> str:
-    return RUN_COLOURS[index % len(RUN_COLOURS)]
+    return style.RUN_COLOURS[index % len(style.RUN_COLOURS)]

@@ -11,9 +11,9 @@ from math import comb
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake import CableRobot
 from cdpr_drake.model.cable_models import instantaneous_row
 from cdpr_drake.model.kinematics import D_B, CableGeometry, D_Bf, cable_geometry
-from cdpr_drake import CableRobot
 from cdpr_drake.model.rotations import Array, skew
 from cdpr_drake.model.servo import interaction_matrix
 from cdpr_drake.model.statics import D_ext, D_tau, D_theta, attachment_forces

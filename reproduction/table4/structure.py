@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 
+from cdpr_drake import CableRobot
 from cdpr_drake.model.equilibrium import RestState, forward_kinematics
 from cdpr_drake.model.inverse_kinematics import InverseKinematics
 from cdpr_drake.model.kinematics import cable_geometry
-from cdpr_drake import CableRobot
 from cdpr_drake.model.robot import AxialStiffness
 from cdpr_drake.model.rotations import Array
 from cdpr_drake.runs import Setup, setup_of_test

@@ -15,6 +15,7 @@ from cdpr_drake.model.rotations import Array, as_pose
 from cdpr_drake.runs import Run, Setup, run, setup_of_test
 from reproduction.assumptions import assumed, assumptions
 from reproduction.believed import Eyes, setup_from
+from reproduction.section import Result
 from reproduction.table4.explanations import (
     EXPLANATIONS,
     TESTS,
@@ -25,7 +26,6 @@ from reproduction.table4.explanations import (
     largest_of_tests_1_and_2,
     predictions,
 )
-from reproduction.section import Result
 from reproduction.table4.structure import EndError, Structure, joint_space_end, orientation_error
 
 MAX_STEP = 0.0134

@@ -10,9 +10,9 @@ from cdpr_drake.model.rotations import Array
 from cdpr_drake.model.servo import pose_error
 from cdpr_drake.runs import setup_of_test
 from reproduction.assumptions import printed
-from reproduction.table5.convergence import median_interval
 from reproduction.null_models import chance_of_order, share, within
 from reproduction.section import Claim, Result, kind_by
+from reproduction.table5.convergence import median_interval
 from reproduction.table5.work import LAST, LEVELS, MODELS, TESTS
 from reproduction.texts import Texts
 

@@ -42,7 +42,8 @@ def _errors(results: Mapping[str, Result], pairs: Sequence[Result]) -> Table:
             true = stacked(pairs, number, model, "true")
             columns = (seen.mean(axis=0), seen.max(axis=0), np.median(true, axis=0), true.max(0))
             theirs = paper[f"real_{model.lower()}_test_{number}"].value
-            rows.append((f"{model}, real robot, Test {number}", *theirs, *rounded(np.ravel(columns))))
+            ours = rounded(np.ravel(columns))
+            rows.append((f"{model}, real robot, Test {number}", *theirs, *ours))
         for model in MODELS:
             entry = paper.get(f"simulator_{model.lower()}_test_{number}")
             ideal = rounded(results[f"ideal-{number}"][f"{number} {model}"]["true"])
@@ -60,7 +61,8 @@ def _times(results: Mapping[str, Result], pairs: Sequence[Result]) -> Table:
             ours = (*median_interval(every[:, row, LEVEL]), ideally[row, LEVEL])
             theirs = -paper[f"delta_t_test_{number}"].value
             rows.append((f"Test {number}, {text}", theirs, *(round(float(x), 4) for x in ours)))
-    return TEXTS.table("times", rows, others=[-value for value in paper["delta_t_unassigned"].value])
+    others = [-value for value in paper["delta_t_unassigned"].value]
+    return TEXTS.table("times", rows, others=others)
 
 
 def _levels(pairs: Sequence[Result]) -> Table:
@@ -71,9 +73,7 @@ def _levels(pairs: Sequence[Result]) -> Table:
         apart = spread(pairs, number)
         for i, level in enumerate(LEVELS):
             medians = rounded([np.median(clean[:, i]), np.median(noisy[:, i])], 4)
-            rows.append(
-                (f"Test {number}, {100 * level:g} %", *medians, round(float(apart[i]), 2))
-            )
+            rows.append((f"Test {number}, {100 * level:g} %", *medians, round(float(apart[i]), 2)))
     return TEXTS.table("levels", rows)
 
 

@@ -13,8 +13,8 @@ from cdpr_drake.model.rotations import Array
 from cdpr_drake.runs import Run, Setup, run, setup_of_test
 from reproduction.assumptions import assumed
 from reproduction.believed import Eyes, setup_from
-from reproduction.table5.convergence import crossing_time, noiseless_error
 from reproduction.section import Result
+from reproduction.table5.convergence import crossing_time, noiseless_error
 
 TESTS = (4, 5)
 MODELS = ("SCMWE", "SLSM")

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
+from cdpr_drake import CableRobot
 from cdpr_drake.model.cable_models import cable_angles
 from cdpr_drake.model.kinematics import cable_geometry
-from cdpr_drake import CableRobot
 from cdpr_drake.model.rotations import Array
 from cdpr_drake.model.statics import weight_wrench, wrench_matrix
 

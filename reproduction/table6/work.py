@@ -10,8 +10,8 @@ from cdpr_drake import load_robot
 from cdpr_drake.model.rotations import Array
 from reproduction.assumptions import assumptions, printed
 from reproduction.null_models import share
-from reproduction.table6.sag_search import LEAST_TENSION, NAMES, ScaledRobots, search
 from reproduction.section import Result
+from reproduction.table6.sag_search import LEAST_TENSION, NAMES, ScaledRobots, search
 
 SIZES = ("22m", "37m", "98m")
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from cdpr_drake.model.rotations import Array
 from reproduction.assumptions import assumptions, printed
-from reproduction.table7.large_robot import MODELS, final_errors, printed_errors, time_to
 from reproduction.null_models import chance_of_order, share, within
 from reproduction.section import Claim, Kind, Result
+from reproduction.table7.large_robot import MODELS, final_errors, printed_errors, time_to
 from reproduction.table7.variations import SOFT, variations
 from reproduction.texts import Texts
 

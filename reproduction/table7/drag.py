@@ -14,11 +14,10 @@ import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, Diagram, DiagramBuilder, LeafSystem
 
-from cdpr_drake.analysis import SampledServo
-from cdpr_drake.diagrams import make_vision_based_control, rest_context, simulate
-from cdpr_drake.diagrams import Record
-from cdpr_drake.model.rest_model import mass_matrix
 from cdpr_drake import CableRobot
+from cdpr_drake.analysis import SampledServo
+from cdpr_drake.diagrams import Record, make_vision_based_control, rest_context, simulate
+from cdpr_drake.model.rest_model import mass_matrix
 from cdpr_drake.model.rotations import pose_to_vector, vector_to_pose
 from cdpr_drake.runs import RECORD_PERIOD, Setup
 

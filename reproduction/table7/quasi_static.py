@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 
+from cdpr_drake import CableRobot
 from cdpr_drake.model.camera import true_from_seen
 from cdpr_drake.model.equilibrium import forward_kinematics, platform_balance, rest_state
-from cdpr_drake import CableRobot
 from cdpr_drake.model.rotations import Array, as_pose, pose_to_vector
 from cdpr_drake.model.servo import MotorRateLaw, ServoSettings, pose_error
 

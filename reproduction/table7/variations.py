@@ -7,13 +7,19 @@ from typing import Any
 
 import numpy as np
 
+from cdpr_drake import CableRobot
 from cdpr_drake.errors import CdprError
 from cdpr_drake.model.calibration_errors import CalibrationErrors, misjudged
-from cdpr_drake import CableRobot
 from cdpr_drake.model.rotations import Array
 from reproduction.assumptions import assumed, assumptions
-from reproduction.table7.large_robot import MODELS, believed_robot, final_errors, slow_run, true_robot
 from reproduction.section import Result
+from reproduction.table7.large_robot import (
+    MODELS,
+    believed_robot,
+    final_errors,
+    slow_run,
+    true_robot,
+)
 
 WITHOUT_PART = ("damping_time", "drag", "target_signs")
 """Values that play no part in slow motion, or are no matter of size."""
