@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import yaml  # type: ignore[import-untyped]
 
-from reproduction.section import Claim, Figure, Kind, Panel, Section, Table
+from reproduction.section import Claim, Figure, Kind, Panel, Section, Table, kind_by
 
 KINDS = ("sections", "claims", "tables", "figures", "words")
 """What there is in a file of texts, each by names."""
@@ -76,8 +76,8 @@ class Texts:
         self,
         name: str,
         *,
-        agrees: bool,
-        kind: Kind,
+        agrees: bool | np.bool_,
+        kind: Kind | None = None,
         null_rate: float | None = None,
         **numbers: Any,
     ) -> Claim:
@@ -86,11 +86,13 @@ class Texts:
         Args:
             name: of its texts.
             agrees: whether it holds here.
-            kind: of `Claim`.
+            kind: of `Claim`; what `kind_by` says of the null rate if None.
             null_rate: of `Claim`.
             numbers: for the places of its texts, by name.
         """
         texts = self._filled("claims", name, numbers)
+        if kind is None:
+            kind = kind_by(1.0 if null_rate is None else null_rate)
         return Claim(**texts, agrees=bool(agrees), kind=kind, null_rate=null_rate)
 
     def table(self, name: str, rows: Sequence[Sequence[Any]], **numbers: Any) -> Table:

@@ -10,7 +10,7 @@ import numpy as np
 from cdpr_drake.model.rotations import Array
 from reproduction.assumptions import printed
 from reproduction.null_models import share
-from reproduction.section import Claim, Kind, Result, kind_by
+from reproduction.section import Claim, Result
 from reproduction.table4.tables import Visions, left_over
 from reproduction.texts import Texts
 
@@ -47,11 +47,10 @@ def claims(results: Mapping[str, Result], visions: Visions) -> tuple[Claim, ...]
 
 def _with_estimator(name: str, kind: str, rate: float, agrees: bool, **numbers: Any) -> Claim:
     """Return a claim on the ends with the estimator of a kind of calibration."""
-    of_claim: Kind = kind_by(rate) if kind == "mean" else "fitted"
     return TEXTS.claim(
         name,
         agrees=agrees,
-        kind=of_claim,
+        kind=None if kind == "mean" else "fitted",
         null_rate=rate,
         estimator=TEXTS.words("estimators")[kind],
         parameters=TEXTS.words("calibration")[kind],
@@ -121,13 +120,11 @@ def _better_than_jsc(results: Mapping[str, Result], ends: Mapping[str, Array]) -
     vision = np.abs(ends["position"][:, :, 2])
     jsc = np.abs(results["jsc-statics"]["position"][:, 2])
     soft = np.abs(results["moduli"]["position"][:, :, 2])
-    rate = share(np.all(vision[:, None] < soft, axis=2).ravel())
     largest = vision.max(axis=0)
     return TEXTS.claim(
         "better",
         agrees=np.all(largest < jsc),
-        kind=kind_by(rate),
-        null_rate=rate,
+        null_rate=share(np.all(vision[:, None] < soft, axis=2).ravel()),
         vision=largest,
         jsc=jsc,
     )
@@ -151,12 +148,11 @@ def _joint_space_claims(results: Mapping[str, Result]) -> list[Claim]:
         payload.
         """
         every = results["moduli"]
-        rate = share(map(meets, every["position"], every["beyond"]))
         return TEXTS.claim(
             name,
             agrees=meets(position, np.asarray(beyond)),
-            kind="fitted" if fitted else kind_by(rate),
-            null_rate=rate,
+            kind="fitted" if fitted else None,
+            null_rate=share(map(meets, every["position"], every["beyond"])),
             moduli=every["modulus"][[0, -1]],
             **numbers,
         )
@@ -208,12 +204,10 @@ def _from_test_3_alone(results: Mapping[str, Result]) -> Claim:
     def near(largest: float) -> bool:
         return abs(largest - theirs) <= CLOSE_LARGEST * theirs
 
-    rate = share(near(_largest_of(position)) for position in every["position"])
     return TEXTS.claim(
         "from_test_3",
         agrees=near(ours),
-        kind=kind_by(rate),
-        null_rate=rate,
+        null_rate=share(near(_largest_of(position)) for position in every["position"]),
         theirs=theirs,
         ours=ours,
         moduli=every["modulus"][[0, -1]],

@@ -11,7 +11,7 @@ from cdpr_drake.model.servo import pose_error
 from cdpr_drake.runs import setup_of_test
 from reproduction.assumptions import printed
 from reproduction.null_models import chance_of_order, share, within
-from reproduction.section import Claim, Result, kind_by
+from reproduction.section import Claim, Result
 from reproduction.table5.convergence import median_interval
 from reproduction.table5.work import LAST, LEVELS, MODELS, TESTS
 from reproduction.texts import Texts
@@ -55,12 +55,10 @@ def _final(runs: Sequence[Result], place: str, model: str, number: int) -> Claim
     theirs = printed("table5")[f"{place}_{model.lower()}_test_{number}"].value
     seen = stacked(runs, number, model, "seen").mean(axis=0)
     alone = without_model(number, noise=place == "real")
-    rate = share(_like(one, theirs) for one in alone)
     return TEXTS.claim(
         FINAL[place],
         agrees=_like(seen, theirs),
-        kind=kind_by(rate),
-        null_rate=rate,
+        null_rate=share(_like(one, theirs) for one in alone),
         model=model,
         number=number,
         theirs=theirs,
@@ -115,12 +113,10 @@ def _by_how_much(pairs: Sequence[Result], number: int) -> Claim:
     theirs = printed("table5")[f"delta_t_test_{number}"].value
     median = float(np.median(differences(pairs, number)[:, NORM, LEVEL]))
     alike = unpaired(pairs, number, (MODELS[0], MODELS[0])).ravel()
-    rate = share(within(-dt, theirs, LIKE) for dt in alike)
     return TEXTS.claim(
         "by_how_much",
         agrees=within(-median, theirs, LIKE),
-        kind=kind_by(rate),
-        null_rate=rate,
+        null_rate=share(within(-dt, theirs, LIKE) for dt in alike),
         number=number,
         theirs=theirs,
         median=median,

@@ -11,7 +11,7 @@ import numpy as np
 from cdpr_drake.model.rotations import Array
 from reproduction.assumptions import assumptions
 from reproduction.null_models import share
-from reproduction.section import Case, Claim, Result, Section, Table, kind_by
+from reproduction.section import Case, Claim, Result, Section, Table
 from reproduction.table6.sag_search import NAMES
 from reproduction.table6.work import LOOKS, SIZES, look, permute, printed_dbeta, random_sets
 from reproduction.texts import Texts
@@ -96,7 +96,6 @@ def _claims(results: Mapping[str, Result]) -> tuple[Claim, ...]:
         TEXTS.claim(
             "growth",
             agrees=np.all(np.diff(common["dbeta"], axis=0) > 0.0),
-            kind=kind_by(random["growing"]),
             null_rate=random["growing"],
             theirs=printed_dbeta(SIZES).mean(axis=1),
             ours=np.mean(common["dbeta"], axis=1),
