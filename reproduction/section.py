@@ -195,8 +195,4 @@ class Reproduction(Protocol):
         """Return the work to do."""
 
     def section(self, results: Mapping[str, Result]) -> Section:
-        """Return what came of it.
-
-        Args:
-            results: of all cases, by their keys.
-        """
+        """Return what came of it, from the `results` of all cases."""

@@ -17,7 +17,8 @@ __all__ = ["Outcome", "Sweep", "plain", "sweep"]
 
 def __getattr__(name: str) -> Any:
     """Import what this offers by `name` when first asked for."""
+    if name == "plain":
+        return importlib.import_module("cdpr_drake.batch.job").plain
     if name in __all__:
-        place = "job" if name == "plain" else "sweeps"
-        return getattr(importlib.import_module(f"cdpr_drake.batch.{place}"), name)
+        return getattr(importlib.import_module("cdpr_drake.batch.sweeps"), name)
     raise AttributeError(f"module 'cdpr_drake.batch' has no attribute '{name}'")

@@ -6,7 +6,6 @@ robot: what else it offers is loaded when first asked for.
 
 from __future__ import annotations
 
-import importlib
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -29,16 +28,6 @@ __all__ = [
     "staged",
     "to_json",
 ]
-
-_PLACES = {
-    "CaseProgress": "terminal",
-    "DOTS_PER_INCH": "files",
-    "print_message": "terminal",
-    "print_wrapped": "terminal",
-    "run_command": "execution",
-    "staged": "files",
-    "to_json": "files",
-}
 
 EXIT_STATUS = (
     "0, done; 1, a run left what the model covers, or results could not be written; 2, the input "
@@ -81,6 +70,10 @@ class Command:
 
 def __getattr__(name: str) -> Any:
     """Import what this offers by `name` when first asked for."""
-    if name in _PLACES:
-        return getattr(importlib.import_module(f"cdpr_drake.commands.{_PLACES[name]}"), name)
+    if name in __all__:
+        from cdpr_drake.commands import execution, files, terminal
+
+        return next(
+            vars(place)[name] for place in (execution, files, terminal) if name in vars(place)
+        )
     raise AttributeError(f"module 'cdpr_drake.commands' has no attribute '{name}'")

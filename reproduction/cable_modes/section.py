@@ -27,11 +27,7 @@ def cases() -> Sequence[Case]:
 
 
 def section(results: Mapping[str, Result]) -> Section:
-    """Return the section on the limit of static cables.
-
-    Args:
-        results: of all cases, by their keys.
-    """
+    """Return the section on the limit of static cables, from the `results` of all cases."""
     gain = assumed("table7")["gain"]
     pace = gain / (2.0 * math.pi)
     return TEXTS.section(

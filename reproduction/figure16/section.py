@@ -27,11 +27,7 @@ def cases() -> Sequence[Case]:
 
 
 def section(results: Mapping[str, Result]) -> Section:
-    """Return the figure, and what the paper says of it.
-
-    Args:
-        results: of all cases, by their keys.
-    """
+    """Return the figure, and what the paper says of it, from the `results` of all cases."""
     lines = {model: _lines(results[model]) for model in MODELS}
     panels = [
         (*error_panels({"": result}, model), velocity_panel({"": result}, model))

@@ -152,11 +152,7 @@ def _sag(result: Result) -> Claim:
 
 
 def claims_of_13(results: Mapping[str, Result]) -> list[Claim]:
-    """Return the claims on Figure 13.
-
-    Args:
-        results: of its runs, by their keys.
-    """
+    """Return the claims on Figure 13, from the `results` of its runs."""
     found = []
     for number in (4, 5):
         runs = {m: results[key(number, m, "robot")] for m in ("SCMWE", "SLSM")}
@@ -186,11 +182,7 @@ def similar(number: int, results: Mapping[str, Result], models: Sequence[str]) -
 
 
 def claims_of_15(results: Mapping[str, Result]) -> list[Claim]:
-    """Return the claims on Figure 15.
-
-    Args:
-        results: of its runs, by their keys.
-    """
+    """Return the claims on Figure 15, from the `results` of its runs."""
     theirs = printed("figures")["most_tensed_test_2"].value
     ours = {
         place: np.mean(results[key(2, "SCMWE", place)]["tension"], axis=0)

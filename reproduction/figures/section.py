@@ -43,11 +43,7 @@ class PaperFigure:
         ]
 
     def section(self, results: Results) -> Section:
-        """Return the figure and what the paper says of it.
-
-        Args:
-            results: of all cases, by their keys.
-        """
+        """Return the figure and what the paper says of it, from the `results` of all cases."""
         figure: Figure = TEXTS.figure(self.name, self.panels(results))
         return TEXTS.section(self.name, figures=(figure,), claims=self.claims_of(results))
 

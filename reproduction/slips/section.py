@@ -24,11 +24,7 @@ def cases() -> Sequence[Case]:
 
 
 def section(results: Mapping[str, Result]) -> Section:
-    """Return the section on slips.
-
-    Args:
-        results: of all cases, by their keys.
-    """
+    """Return the section on slips, from the `results` of all cases."""
     return TEXTS.section(name, tables=(_law_table(results), _other_table(results)))
 
 

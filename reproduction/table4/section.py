@@ -74,11 +74,7 @@ def _chunks(kind: str) -> list[list[int]]:
 
 
 def section(results: Mapping[str, Result]) -> Section:
-    """Return the section on Table 4.
-
-    Args:
-        results: of all cases, by their keys.
-    """
+    """Return the section on Table 4, from the `results` of all cases."""
     visions = {kind: _gathered(results, kind) for kind in CHUNK}
     return Texts(name).section(
         name,

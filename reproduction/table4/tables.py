@@ -42,11 +42,7 @@ def tables(results: Mapping[str, Result], visions: Visions) -> tuple[Table, ...]
 
 
 def amplitude(number: int) -> float:
-    """Return the length of a test's move, of M [m].
-
-    Args:
-        number: of the test.
-    """
+    """Return the length [m] of the move of M in a test, by its `number`."""
     setup = setup_of_test(number)
     error = pose_error(setup.start, setup.goal, setup.robot.cameras.X_PM)
     return float(np.linalg.norm(error[3:]))
@@ -64,11 +60,7 @@ def left_over(number: int) -> float:
 
 
 def fits(results: Mapping[str, Result]) -> list[Result]:
-    """Return what the fits of the explanations found.
-
-    Args:
-        results: of all cases, by their keys.
-    """
+    """Return what the fits of the explanations found, from the `results` of all cases."""
     return [results[f"explain-{i + 1}"] for i in range(len(EXPLANATIONS))]
 
 

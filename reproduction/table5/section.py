@@ -36,11 +36,7 @@ def cases() -> Sequence[Case]:
 
 
 def section(results: Mapping[str, Result]) -> Section:
-    """Return the section on Table 5.
-
-    Args:
-        results: of all cases, by their keys.
-    """
+    """Return the section on Table 5, from the `results` of all cases."""
     pairs = [results[key] for key in results if key.startswith("pair-")]
     rates = {
         model: min(float(results[f"ideal-{n}"][f"{n} {model}"]["rates"][0]) for n in TESTS)

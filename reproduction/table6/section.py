@@ -38,11 +38,7 @@ def cases() -> Sequence[Case]:
 
 
 def section(results: Mapping[str, Result]) -> Section:
-    """Return the section on Table 6.
-
-    Args:
-        results: of all cases, by their keys.
-    """
+    """Return the section on Table 6, from the `results` of all cases."""
     common = results["common"]
     rms, rank = _permuted(results)
     return TEXTS.section(

@@ -40,11 +40,7 @@ SAGGING = MODELS[:3]
 
 
 def claims(results: Mapping[str, Result]) -> tuple[Claim, ...]:
-    """Return all claims on Table 7.
-
-    Args:
-        results: of all cases, by their keys.
-    """
+    """Return all claims on Table 7, from the `results` of all cases."""
     ours = errors_of(results, "move")
     return (
         *_orders(results, ours),

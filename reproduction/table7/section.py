@@ -31,11 +31,7 @@ def cases() -> Sequence[Case]:
 
 
 def section(results: Mapping[str, Result]) -> Section:
-    """Return the section on Table 7.
-
-    Args:
-        results: of all cases, by their keys.
-    """
+    """Return the section on Table 7, from the `results` of all cases."""
     given, ecm = assumptions(name), printed_errors()[0]
     fitted = [n for n, a in given.items() if a.kind == "fitted"]
     distance = float(np.linalg.norm(GOAL.translation()))

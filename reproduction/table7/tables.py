@@ -27,11 +27,7 @@ TEXTS = Texts("table7")
 
 
 def tables(results: Mapping[str, Result]) -> tuple[Table, ...]:
-    """Return all tables on Table 7.
-
-    Args:
-        results: of all cases, by their keys.
-    """
+    """Return all tables on Table 7, from the `results` of all cases."""
     return (
         _comparison(results),
         _delta_t_table(results),
