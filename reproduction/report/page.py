@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from importlib import resources
+from string import Template
 from typing import Any
 
 from reproduction.report.pictures import panel_svg
@@ -26,48 +27,21 @@ def report_html(report: Mapping[str, Any], figures: Mapping[str, Sequence[Figure
         report: as `report_of` gives it.
         figures: of the sections, by their names.
     """
-    style = resources.files(__package__) / "page.css"
-    sections = report["sections"]
-    return "\n".join(
-        [
-            "<!DOCTYPE html>",
-            '<html lang="en">',
-            "<head>",
-            '<meta charset="utf-8">',
-            '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            '<meta name="color-scheme" content="light dark">',
-            "<title>The paper, made again</title>",
-            f"<style>\n{style.read_text(encoding='utf-8')}</style>",
-            "</head>",
-            "<body>",
-            *_head(report),
-            *_overview(sections),
-            *(
-                line
-                for section in sections
-                for line in _section(section, figures.get(section["name"], ()))
-            ),
-            "</body>",
-            "</html>",
-            "",
-        ]
+    folder, sections = resources.files(__package__), report["sections"]
+    content = [*_overview(sections)]
+    for section in sections:
+        content += _section(section, figures.get(section["name"], ()))
+    page = Template((folder / "page.html").read_text(encoding="utf-8"))
+    return page.substitute(
+        style=(folder / "page.css").read_text(encoding="utf-8"),
+        paper=escape(report["paper"]),
+        count=count_of_claims(report),
+        made=report["made"],
+        cdpr_drake=report["cdpr_drake"],
+        drake=report["drake"],
+        minutes=f"{report['cpu_time_s'] / 60.0:.1f}",
+        content="\n".join(content),
     )
-
-
-def _head(report: Mapping[str, Any]) -> Iterable[str]:
-    made = (
-        f"Made {report['made']} with cdpr_drake {report['cdpr_drake']} and Drake "
-        f"{report['drake']} in {report['cpu_time_s'] / 60.0:.1f} minutes of processor time by "
-        "<code>make reproduce</code>."
-    )
-    return [
-        "<header>",
-        "<h1>The paper, made again</h1>",
-        f"<p>{escape(report['paper'])}: what it prints beside what this simulation gives. "
-        f"<strong>{count_of_claims(report)}</strong></p>",
-        f'<p class="quiet">{made}</p>',
-        "</header>",
-    ]
 
 
 def _overview(sections: Sequence[Mapping[str, Any]]) -> Iterable[str]:

@@ -133,12 +133,15 @@ class EndError:
         position: (3,) of E in W [mm].
         orientation: (3,) [deg], X-Y-Z angles of the true platform in the desired one's frame
             turned parallel to W; so small that the convention does not matter.
-        tension: (k,) at the drawing points [N].
     """
 
     position: Array
     orientation: Array
-    tension: Array
+
+    @property
+    def flat(self) -> Array:
+        """Position [mm] and orientation [deg] in one (6,)."""
+        return np.concatenate([self.position, self.orientation])
 
 
 def joint_space_end(
@@ -162,11 +165,7 @@ def joint_space_end(
         robot = robot.with_payload(payload)
     goal = RigidTransform(goal.rotation(), goal.translation() + np.asarray(shift, float))
     rest = joint_space_rest(structure, robot, goal, direction)
-    return EndError(
-        position=1e3 * (rest.X_WP.translation() - goal.translation()),
-        orientation=orientation_error(rest.X_WP, goal),
-        tension=rest.tension_at_drawing_point,
-    )
+    return end_error(rest.X_WP, goal)
 
 
 @functools.cache
@@ -175,12 +174,15 @@ def _move(number: int) -> tuple[Setup, Array]:
     return setup, last_direction(setup)
 
 
-def orientation_error(true: RigidTransform, desired: RigidTransform) -> Array:
-    """Return the angles (3,) [deg] about W's axes by which one attitude is off another.
+def end_error(true: RigidTransform, desired: RigidTransform) -> EndError:
+    """Return how far the platform is from where it should be.
 
     Args:
         true: X_WP.
         desired: X_WP.
     """
     turn = true.rotation() @ desired.rotation().inverse()
-    return np.degrees(turn.ToRollPitchYaw().vector())
+    return EndError(
+        position=1e3 * (true.translation() - desired.translation()),
+        orientation=np.degrees(turn.ToRollPitchYaw().vector()),
+    )

@@ -26,7 +26,7 @@ from reproduction.table4.explanations import (
     largest_of_tests_1_and_2,
     predictions,
 )
-from reproduction.table4.structure import EndError, Structure, joint_space_end, orientation_error
+from reproduction.table4.structure import EndError, Structure, end_error, joint_space_end
 
 MAX_STEP = 0.0134
 """Of the integrator [s]: four steps to a frame; ends are those of five to 0.03 mm."""
@@ -176,7 +176,7 @@ def vision_run(number: int) -> Result:
         "after": duration,
         "then": _error_of(done, duration),
         "rest": _error_of(done, REST),
-        "predicted": _flat(end_error(eyes.rest_pose(setup.goal), setup.goal)),
+        "predicted": end_error(eyes.rest_pose(setup.goal), setup.goal).flat,
         "slack_cables": sorted(done.summary.slack_cables),
     }
 
@@ -221,7 +221,7 @@ def camera_run(number: int) -> Result:
     )  # fmt: skip
     return {
         "rest": _error_of(done, done.setup.until),
-        "predicted": _flat(end_error(predicted, setup.goal)),
+        "predicted": end_error(predicted, setup.goal).flat,
     }
 
 
@@ -235,22 +235,8 @@ def joint_space_run(number: int) -> Result:
     done = run(setup)
     return {
         "rest": _error_of(done, FAST),
-        "predicted": _flat(joint_space_end(fitted_structure(), number)),
+        "predicted": joint_space_end(fitted_structure(), number).flat,
     }
-
-
-def end_error(true: RigidTransform, desired: RigidTransform) -> EndError:
-    """Return how far the platform is from where it should be.
-
-    Args:
-        true: X_WP.
-        desired: X_WP.
-    """
-    return EndError(
-        position=1e3 * (true.translation() - desired.translation()),
-        orientation=orientation_error(true, desired),
-        tension=np.zeros(0),
-    )
 
 
 def _setup(number: int, **changes: Any) -> Setup:
@@ -263,11 +249,7 @@ def _error_of(done: Run, time: float) -> Array:
     """Return (6,) the mean error over the seconds before a time: (x, y, z) [mm], angles [deg]."""
     t = done.record.time
     poses = done.record["pose"][(t <= time + 1e-9) & (t > time - LATE)]
-    return np.mean([_flat(end_error(as_pose(p), done.setup.goal)) for p in poses], axis=0)
-
-
-def _flat(error: EndError) -> Array:
-    return np.concatenate([error.position, error.orientation])
+    return np.mean([end_error(as_pose(p), done.setup.goal).flat for p in poses], axis=0)
 
 
 def _beyond(structure: Structure) -> list[float]:
@@ -281,7 +263,6 @@ def _ends(structure: Structure) -> dict[str, Any]:
     return {
         "position": np.array([errors[n].position for n in TESTS]),
         "orientation": np.array([errors[n].orientation for n in TESTS]),
-        "tensions": np.array([errors[n].tension for n in TESTS]),
     }
 
 

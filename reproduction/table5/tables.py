@@ -90,10 +90,11 @@ def spread(pairs: Sequence[Result], number: int) -> Array:
 
 def _changes(results: Mapping[str, Result]) -> Table:
     rows = []
+    texts = TEXTS.words("changes")
     for i, change in enumerate(CHANGES):
         found = results[f"changed-{i}" if i > 0 else f"ideal-{CHANGED_TEST}"]
         dt = differences([found], CHANGED_TEST)[0]
         times = (dt[NORM, LEVEL], dt[Z, LEVEL], dt[NORM, -1])
         final = [found[f"{CHANGED_TEST} {m}"]["seen"][0] for m in MODELS]
-        rows.append((change, *(round(float(t), 4) for t in times), *rounded(final)))
+        rows.append((texts[change], *(round(float(t), 4) for t in times), *rounded(final)))
     return TEXTS.table("changes", rows, number=CHANGED_TEST, least=LEVELS[-1])

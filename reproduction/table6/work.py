@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.stats import rankdata
 
 from cdpr_drake import load_robot
 from cdpr_drake.model.rotations import Array
@@ -123,13 +124,7 @@ def rank_correlation(a: Array, b: Array) -> float:
         a: (n,) numbers.
         b: (n,) numbers.
     """
-    return float(np.corrcoef(_ranks(a), _ranks(b))[0, 1])
-
-
-def _ranks(a: Array) -> Array:
-    below = (a[:, None] > a).sum(1)
-    same = (a[:, None] == a).sum(1)
-    return below + 0.5 * (same - 1)
+    return float(np.corrcoef(rankdata(a), rankdata(b))[0, 1])
 
 
 def _at_end(value: float, low: float, high: float) -> bool:
