@@ -25,7 +25,7 @@ def numbers_of(setup: Setup) -> tuple[Loop, Start]:
         gain=setup.gain,
         sample_time=setup.loop.timing.sample_time,
         latency=setup.loop.timing.latency,
-        ramp_time=setup.loop.law.ramp_time,
+        ramp_time=setup.loop.ramp_time,
     )
     start = Start(
         rotation=setup.start.rotation().matrix(),

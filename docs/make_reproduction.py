@@ -16,7 +16,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from reproduction.words import (
+from reproduction.report.words import (
     count_of_claims,
     fitted_and_assumed,
     how_often,

@@ -9,11 +9,17 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cdpr_drake.__main__ import carry_out
-from cdpr_drake.commands import Command, UsageError
-from cdpr_drake.commands.files import DOTS_PER_INCH, staged, to_json
-from cdpr_drake.commands.parsing import parse_for
-from cdpr_drake.commands.terminal import CaseProgress, print_message, print_wrapped
+from cdpr_drake.commands import (
+    DOTS_PER_INCH,
+    CaseProgress,
+    Command,
+    UsageError,
+    print_message,
+    print_wrapped,
+    run_command,
+    staged,
+    to_json,
+)
 
 if TYPE_CHECKING:
     from reproduction.reproduce import Reproduced
@@ -109,8 +115,8 @@ def _wanted(
 
 def _write(folder: Path, report: dict[str, Any], found: Sequence[Reproduced]) -> list[str]:
     """Write the report and the figures, and return the names of the files."""
-    from reproduction.paper_figures import paper_figure
-    from reproduction.report import report_html
+    from reproduction.report.page import report_html
+    from reproduction.report.pictures import paper_figure
 
     figures = {part.name: part.section.figures for part in found if part.section is not None}
     (folder / "report.html").write_text(report_html(report, figures), encoding="utf-8")
@@ -126,7 +132,7 @@ def _write(folder: Path, report: dict[str, Any], found: Sequence[Reproduced]) ->
 
 def _print(report: Mapping[str, Any]) -> None:
     """Print a summary: each claim, the paper's number and ours, and what it could have been."""
-    from reproduction.words import count_of_claims, verdict, what_else
+    from reproduction.report.words import count_of_claims, verdict, what_else
 
     for section in report["sections"]:
         print()
@@ -153,8 +159,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Raises:
         SystemExit: after --help.
     """
-    given = sys.argv[1:] if argv is None else argv
-    return carry_out(lambda: parse_for(COMMAND, "python -m reproduction", given))
+    return run_command(COMMAND, "python -m reproduction", argv)
 
 
 if __name__ == "__main__":

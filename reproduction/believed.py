@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
+from cdpr_drake import CableRobot
 from cdpr_drake.model.calibration import CalibrationSetup, calibrate, platform_poses
 from cdpr_drake.model.calibration.hand_eye import robot_world_hand_eye
 from cdpr_drake.model.calibration.motions import difference
-from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, exp_rotation
 from cdpr_drake.model.vision.pose import PoseEstimator
 from cdpr_drake.model.vision.rotation_means import mean_pose

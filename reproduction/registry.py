@@ -4,8 +4,15 @@ from __future__ import annotations
 
 from typing import cast
 
-from reproduction import cable_modes, figure16, figures, slips, table4, table5, table6, table7
+from reproduction.cable_modes import section as cable_modes
+from reproduction.figure16 import section as figure16
+from reproduction.figures import section as figures
 from reproduction.section import Reproduction
+from reproduction.slips import section as slips
+from reproduction.table4 import section as table4
+from reproduction.table5 import section as table5
+from reproduction.table6 import section as table6
+from reproduction.table7 import section as table7
 
 
 def reproductions() -> dict[str, Reproduction]:

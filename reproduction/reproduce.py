@@ -15,9 +15,8 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake import __version__
-from cdpr_drake.analysis.step_size import StepWarning
-from cdpr_drake.batch import Sweep, sweep
-from cdpr_drake.batch.job import plain
+from cdpr_drake.analysis import StepWarning
+from cdpr_drake.batch import Sweep, plain, sweep
 from reproduction.assumptions import Assumption, assumptions
 from reproduction.section import Case, Reproduction, Result, Section
 from reproduction.sources import source_of
@@ -163,31 +162,23 @@ def report_of(found: Sequence[Reproduced], cpu_time: float) -> dict[str, Any]:
 
 
 def _entry(part: Reproduced) -> dict[str, Any]:
-    entry: dict[str, Any] = {
+    """Return a section; of one that failed, only its errors."""
+    section = part.section or Section(name=part.name, title=part.name)
+    used = dict(section.fitted)
+    known = part.assumptions if part.section is not None else ()
+    values = [{**vars(a), "value": used.pop(a.name, a.value)} for a in known]
+    return {
         "name": part.name,
-        "title": part.name if part.section is None else part.section.title,
+        "title": section.title,
         "cases": part.cases,
         "cpu_time_s": round(part.cpu_time, 1),
         "errors": {key: list(error) for key, error in part.errors.items()},
-        "text": [],
-        "claims": [],
-        "tables": [],
-        "figures": [],
-        "assumptions": [],
+        "text": list(section.text),
+        "claims": [_tree(vars(claim)) for claim in section.claims],
+        "tables": [_tree(vars(table)) for table in section.tables],
+        "figures": [{"title": f.title, "caption": f.caption} for f in section.figures],
+        "assumptions": _tree([*values, *({"name": n, "value": v} for n, v in used.items())]),
     }
-    if part.section is None:
-        return entry
-    section = part.section
-    entry["text"] = list(section.text)
-    entry["claims"] = [_tree(vars(claim)) for claim in section.claims]
-    entry["tables"] = [_tree(vars(table)) for table in section.tables]
-    entry["figures"] = [{"title": f.title, "caption": f.caption} for f in section.figures]
-    used = dict(section.fitted)
-    entry["assumptions"] = [
-        _tree({**vars(a), "value": used.pop(a.name, a.value)}) for a in part.assumptions
-    ]
-    entry["assumptions"] += [{"name": name, "value": _tree(value)} for name, value in used.items()]
-    return entry
 
 
 def _tree(value: Any) -> Any:

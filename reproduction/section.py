@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol, get_args
 
@@ -40,6 +40,16 @@ class Table:
     headings: tuple[str, ...]
     rows: tuple[tuple[Any, ...], ...]
     note: str = ""
+
+
+def rounded(values: Iterable[float], digits: int = 2) -> list[float]:
+    """Return numbers for the cells of a table, none of them a negative zero.
+
+    Args:
+        values: the numbers.
+        digits: after the point.
+    """
+    return [round(float(v), digits) + 0.0 for v in values]
 
 
 Kind = Literal["tested", "fitted", "by construction"]
@@ -185,8 +195,4 @@ class Reproduction(Protocol):
         """Return the work to do."""
 
     def section(self, results: Mapping[str, Result]) -> Section:
-        """Return what came of it.
-
-        Args:
-            results: of all cases, by their keys.
-        """
+        """Return what came of it, from the `results` of all cases."""

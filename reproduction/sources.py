@@ -22,6 +22,9 @@ PACKAGES = ("cdpr_drake", "reproduction")
 BY_SECTION = ("assumptions.yaml", "printed.yaml")
 """Data files of which a case depends only on the sections that its code names."""
 
+TEXTS = "texts.yaml"
+"""Data files that only sections depend on."""
+
 
 def source_of(function: Callable[..., Any], root: Path = ROOT) -> str:
     """Return a text that changes with the code and data that a function may depend on.
@@ -46,6 +49,8 @@ def _source_of_module(module: str, root: Path) -> str:
         digest.update(f"{name} {ast.dump(tree)}".encode())
         named |= {n.value for n in ast.walk(tree) if isinstance(n, ast.Constant)}
     for path in sorted(p for name in PACKAGES for p in (root / name).rglob("*.yaml")):
+        if path.name == TEXTS:
+            continue
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
         if path.name in BY_SECTION:
             content = {section: values for section, values in content.items() if section in named}

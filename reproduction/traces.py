@@ -9,7 +9,7 @@ import numpy as np
 
 from cdpr_drake.model.calibration_errors import CalibrationErrors, misjudged
 from cdpr_drake.model.rotations import Array
-from cdpr_drake.runs.running import Run, run, setup_of_test
+from cdpr_drake.runs import Run, run, setup_of_test
 from reproduction.section import Line, Panel, Result
 
 MAX_STEP = 0.02
@@ -32,7 +32,7 @@ def trace(number: int, cable_model: str, setting: str) -> Result:
     """
     setup = setup_of_test(number, cable_model=cable_model, max_step=MAX_STEP, seed=number)
     if setting == "robot":
-        setup = setup.replace(calibrated=misjudged(setup.robot, CalibrationErrors(), number))
+        setup = setup.replace(believed=misjudged(setup.robot, CalibrationErrors(), number))
     else:
         setup = setup.replace(noise=False)
     return lines_of(run(setup))

@@ -150,7 +150,7 @@ def test_no_star_import_and_no_pydrake_all(name: str) -> None:
 
 DRAWING_POINTS = {"p_WA", "drawing", "drawing_points", "_A"}
 KERNELS = "cdpr_drake.model.kernels."
-BATCHED = "reproduction.sag_search"
+BATCHED = "reproduction.table6.sag_search"
 """Robots and poses by the thousand in one array; its tests hold it to the package's functions."""
 
 ONCE = {

@@ -331,6 +331,11 @@ def refusal(capsys: pytest.CaptureFixture[str], argv: list[str], status: int = 2
     ("argv", "message"),
     [
         (["fly"], "argument COMMAND: invalid choice: 'fly'"),
+        (
+            ["reproduce"],
+            "argument COMMAND: invalid choice: 'reproduce'; the reproduction is an application of "
+            "the source checkout: make reproduce",
+        ),
         (["run", "--bogus"], "unrecognized arguments: --bogus (try cdpr-drake run --help)"),
         (["run", "--test", "6"], "no test 6; the paper's tests are 1, 2, 3, 4, 5"),
         (["run", "--test", "x"], "argument --test: invalid int value: 'x' (try cdpr-drake run"),

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import html
+import importlib
 import importlib.util
 import json
 import re
@@ -22,18 +24,23 @@ from conftest import find_chromium
 from fake_paper import FakeTable
 
 from cdpr_drake.batch.store import fingerprint, name_of
-from reproduction import figures, figures_claims, poses, sources
 from reproduction import reproduce as machinery
+from reproduction import sources
 from reproduction.__main__ import main
 from reproduction.assumptions import printed
+from reproduction.figure16 import section as figure16
+from reproduction.figures import claims as figures_claims
+from reproduction.figures import poses
+from reproduction.figures import section as figures
 from reproduction.null_models import chance_of_cables, chance_of_order, share, within
-from reproduction.paper_figures import panel_svg, paper_figure
 from reproduction.registry import reproductions
-from reproduction.report import report_html
+from reproduction.report.page import report_html
+from reproduction.report.pictures import panel_svg, paper_figure
+from reproduction.report.words import count_of_claims, in_words
 from reproduction.reproduce import report_of, reproduce
 from reproduction.section import Claim, Figure, Reproduction, kind_by
+from reproduction.texts import contents, filled
 from reproduction.traces import difference, rate, sizes
-from reproduction.words import count_of_claims, in_words
 
 ROOT = Path(__file__).resolve().parents[1]
 VOID = {"meta", "br", "hr", "img", "link", "input"}
@@ -89,6 +96,107 @@ def test_cases_can_be_handed_to_other_processes_and_kept(name: str) -> None:
         json.dumps(dict(case.arguments))
 
 
+# --- what it is made with
+
+FOLDER = ROOT / "reproduction"
+
+
+def not_offered(path: Path) -> list[str]:
+    """Return what a file imports of the package and its own application that is not offered.
+
+    A room offers what is in its `__all__`, a module of `model` and `errors` its public names.
+    """
+    found = []
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found += [a.name for a in node.names if a.name.partition(".")[0] == "cdpr_drake"]
+        if not isinstance(node, ast.ImportFrom):
+            continue
+        assert node.module and not node.level
+        package, _, inner = node.module.partition(".")
+        if package not in ("cdpr_drake", "reproduction"):
+            continue
+        names = {alias.name for alias in node.names}
+        if package == "reproduction" or re.match(r"(model\.|errors$)", inner):
+            wrong = {name for name in (*names, *inner.split(".")) if name.startswith("_")}
+        elif "." in inner:
+            wrong = names
+        else:
+            wrong = names - set(getattr(importlib.import_module(node.module), "__all__", ()))
+        found += [f"{node.module}: {name}" for name in sorted(wrong)]
+    return found
+
+
+@pytest.mark.parametrize(
+    "path", sorted(FOLDER.rglob("*.py")), ids=lambda path: str(path.relative_to(FOLDER))
+)
+def test_it_is_made_with_what_the_package_offers(path: Path) -> None:
+    assert not_offered(path) == []
+
+
+@pytest.mark.parametrize(
+    ("line", "count"),
+    [
+        ("from cdpr_drake.runs.running import Setup", 1),
+        ("from cdpr_drake.runs import Setup", 0),
+        ("from cdpr_drake.runs import running", 1),
+        ("from cdpr_drake.model.statics import wrench_matrix", 0),
+        ("from cdpr_drake.model.statics import _wrench", 1),
+        ("from cdpr_drake.model import statics", 1),
+        ("from cdpr_drake import load_robot, __version__", 0),
+        ("import cdpr_drake.runs.running", 1),
+        ("from reproduction.sources import _tree", 1),
+        ("def f():\n    from cdpr_drake.__main__ import main", 1),
+    ],
+)
+def test_what_is_not_offered_is_found(line: str, count: int, tmp_path: Path) -> None:
+    (tmp_path / "part.py").write_text(line)
+    assert len(not_offered(tmp_path / "part.py")) == count
+
+
+# --- the texts
+
+WITH_TEXTS = [path.parent.name for path in sorted(FOLDER.glob("*/texts.yaml"))]
+
+
+@pytest.mark.parametrize("folder", WITH_TEXTS)
+def test_each_text_is_used(folder: str) -> None:
+    content = contents(folder)
+    code = [ast.parse(path.read_text("utf-8")) for path in (FOLDER / folder).glob("*.py")]
+    named = {n.value for tree in code for n in ast.walk(tree) if isinstance(n, ast.Constant)}
+    unused = [
+        f"{kind}: {name}"
+        for kind, texts in content.items()
+        for name in texts
+        if name not in named and name not in reproductions()
+    ]
+    assert unused == []
+
+
+def test_every_folder_of_a_section_has_its_texts() -> None:
+    titles = [name for folder in WITH_TEXTS for name in contents(folder)["sections"]]
+    assert sorted(titles) == sorted(reproductions())
+
+
+def test_places_are_filled() -> None:
+    numbers = {
+        "a": 1.234, "list": np.array([1.0, 2.0]), "by_name": {"ECM": 0.5, "": 2.0}, "empty": [],
+        "share": 0.123,
+    }  # fmt: skip
+    templates = {
+        "text": "{a:.1f} mm, {list:.0f}, {list[1]:g}; {by_name:.1f 1/s}; {empty}; {share:%.0f} %",
+        "more": ["{a}", "none"],
+    }
+    assert filled(templates, numbers, "here") == {
+        "text": "1.2 mm, 1, 2, 2; ECM 0.5 1/s, 2.0 1/s; none; 12 %",
+        "more": ["1.234", "none"],
+    }
+    with pytest.raises(ValueError, match=r"here: nothing for \{b\}"):
+        filled({"text": "{b:.1f}"}, numbers, "here")
+    with pytest.raises(ValueError, match="here: no place for list"):
+        filled({"text": "{a}"}, {"a": 1, "list": [1]}, "here")
+
+
 # --- running
 
 
@@ -138,6 +246,7 @@ def test_a_source_changes_with_the_code_and_data_it_depends_on(tmp_path: Path) -
         "model/other.py": "import reproduction.runs\nx = 1\n",
         "assumptions.yaml": "table4: {a: 1}\ntable5: {a: 1}\n",
         "robot.yaml": "mass: 1\n",
+        "table4/texts.yaml": "words: {}\n",
     }
     changes = {
         "runs.py": files["runs.py"] + "y = 1\n",
@@ -150,6 +259,7 @@ def test_a_source_changes_with_the_code_and_data_it_depends_on(tmp_path: Path) -
         "model/other.py": "x = 2\n",
         "model/robot.py": "import numpy  # a comment\n\nmass = 1\n",
         "assumptions.yaml": "table5: {a: 2}\ntable4: {a: 1}\n",
+        "table4/texts.yaml": "claims: {}\n",
     }
 
     def source(number: int, changed: dict[str, str]) -> str:
@@ -333,6 +443,24 @@ def test_pictures_say_what_they_show(fakes: dict[str, Reproduction]) -> None:
 
 
 # --- the paper's figures, from made-up runs
+
+
+def test_figure_16_has_the_moves_of_four_models() -> None:
+    time = np.linspace(0.0, 105.0, 421)
+    error = np.exp(-0.06 * time)[:, None] * [20.0, 0.01, 0.05]
+    turn = np.radians(np.exp(-0.06 * time)[:, None] * [0.3, 0.2, 0.1])
+
+    def results(slsm: float) -> dict[str, Any]:
+        move = {"time": time, "position_error": error, "velocity": -0.06 * error}
+        found = {m: {**move, "orientation_error_seen": turn} for m in ("ECM", "CMWE", "SCMWE")}
+        late = turn * np.where(time > 40.0, slsm, 1.0)[:, None]
+        return {**found, "SLSM": {**move, "orientation_error_seen": late}}
+
+    section = figure16.section(results(50.0))
+    assert [claim.agrees for claim in section.claims] == [True, True]
+    assert "ECM 0.30, CMWE 0.30, SCMWE 0.30, SLSM 4.47" in section.claims[0].ours
+    assert [len(row) for row in section.figures[0].panels] == [3, 3, 3, 3]
+    assert [claim.agrees for claim in figure16.section(results(1.0)).claims] == [False, True]
 
 
 def decay(gain: float, tension: np.ndarray, noise: float = 0.0) -> dict[str, Any]:

@@ -11,8 +11,10 @@ from cdpr_drake.model.cable_models import instantaneous_row, unstrained_length
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.servo import D_a, servo_twist
 from cdpr_drake.runs.paper_tests import paper_test
-from reproduction import cable_modes, slips
-from reproduction.printed_equations import (
+from reproduction.cable_modes import section as cable_modes
+from reproduction.cable_modes import work as cable_work
+from reproduction.slips import section as slips
+from reproduction.slips.printed_equations import (
     SLIPS,
     ecm,
     length_rates,
@@ -104,12 +106,12 @@ def test_in_plane_modes_are_those_of_a_discretised_cable(ratio: float) -> None:
     h = 1.0 / n
     A = np.diag(np.full(n - 1, 2.0)) - np.eye(n - 1, k=1) - np.eye(n - 1, k=-1)
     omega2 = np.linalg.eigvalsh(A / h**2 + ratio * h)[0]
-    assert cable_modes.in_plane_factor(ratio) == pytest.approx(np.sqrt(omega2) / np.pi, rel=1e-4)
+    assert cable_work.in_plane_factor(ratio) == pytest.approx(np.sqrt(omega2) / np.pi, rel=1e-4)
 
 
 def test_a_string_as_worked_by_hand() -> None:
     # 10 m, 256 N, 0.064 kg/m: waves run at sqrt(4000) = 63.2 m/s, twice the length in 0.316 s
-    found = cable_modes.string_frequencies(np.array([10.0]), np.array([256.0]), 0.064)
+    found = cable_work.string_frequencies(np.array([10.0]), np.array([256.0]), 0.064)
     assert found[0] == pytest.approx(3.162, abs=1e-3)
 
 

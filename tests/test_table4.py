@@ -9,10 +9,11 @@ from cdpr_drake.analysis import gain_matrix
 from cdpr_drake.model.cable_models import CABLE_MODELS
 from cdpr_drake.runs import setup_of_test
 from cdpr_drake.study import equilibrium
-from reproduction import explanations as e
-from reproduction import table4, table4_work
 from reproduction.assumptions import assumptions, printed
-from reproduction.structure import Structure, joint_space_end
+from reproduction.table4 import explanations as e
+from reproduction.table4 import section as table4
+from reproduction.table4 import work as table4_work
+from reproduction.table4.structure import Structure, joint_space_end
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -48,7 +49,7 @@ def test_friction_stretches_the_run_alone():
     """To first order the run of a cable stretches by T run / EA, times what friction adds."""
     robot = setup_of_test(3).robot
     setup, structure = setup_of_test(3), Structure(modulus=100.0)
-    from reproduction.structure import joint_space_rest
+    from reproduction.table4.structure import joint_space_rest
 
     ends = [
         joint_space_rest(Structure(modulus=100.0, friction=f), robot, setup.goal, -np.ones(8))

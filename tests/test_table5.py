@@ -7,10 +7,12 @@ import pytest
 from scipy.stats import binom
 
 from cdpr_drake.runs import run, setup_of_test
-from reproduction import table5, table5_claims, table5_work
 from reproduction.assumptions import assumptions
 from reproduction.believed import Eyes, setup_from
-from reproduction.convergence import crossing_time, median_interval, noiseless_error
+from reproduction.table5 import claims as table5_claims
+from reproduction.table5 import section as table5
+from reproduction.table5 import work as table5_work
+from reproduction.table5.convergence import crossing_time, median_interval, noiseless_error
 
 
 def test_an_exponential_crosses_a_level_when_it_should():
@@ -77,7 +79,7 @@ def test_measured_at_levels(short_run):
 def test_each_change_changes_the_setup(change):
     setup = setup_of_test(4, noise=False)
     other = table5_work._otherwise(setup, change)
-    names = ("robot", "calibrated", "gain", "tensions")
+    names = ("robot", "loop", "tensions")
     assert any(getattr(other, name) != getattr(setup, name) for name in names)
     assert other.start.IsExactlyEqualTo(setup.start)
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from cdpr_drake.model.robot import load_robot
-from reproduction import table6, table6_work
 from reproduction.assumptions import assumptions
-from reproduction.sag_search import NAMES, ScaledRobots, search
+from reproduction.table6 import section as table6
+from reproduction.table6 import work as table6_work
+from reproduction.table6.sag_search import NAMES, ScaledRobots, search
 
 RANGES = {
     n: (a.low, a.high) for n, a in assumptions("table6").items() if n in NAMES and n != "mass"

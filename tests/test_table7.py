@@ -10,9 +10,12 @@ import pytest
 from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.model.robot import load_robot
 from cdpr_drake.model.servo import ServoSettings
-from reproduction import drag, table7, table7_variations
 from reproduction.assumptions import assumed, assumptions
-from reproduction.large_robot import (
+from reproduction.table7 import drag, work
+from reproduction.table7 import section as table7
+from reproduction.table7 import variations as table7_variations
+from reproduction.table7.claims import ALONG, excursions, one_for_three
+from reproduction.table7.large_robot import (
     GOAL,
     MODELS,
     START,
@@ -23,9 +26,8 @@ from reproduction.large_robot import (
     time_to,
     true_robot,
 )
-from reproduction.quasi_static import run_quasi_static
-from reproduction.table7_claims import ALONG, excursions, one_for_three
-from reproduction.table7_variations import slow_errors, variations, vary
+from reproduction.table7.quasi_static import run_quasi_static
+from reproduction.table7.variations import slow_errors, variations, vary
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +42,7 @@ def slow(values: dict[str, Any]) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def moves() -> dict[str, Any]:
-    return {f"move_{m}": table7.move(m) for m in ("ECM", "SLSM")}
+    return {f"move_{m}": work.move(m) for m in ("ECM", "SLSM")}
 
 
 def test_an_exact_model_goes_straight_home_at_the_pace_of_the_gain(values: dict[str, Any]) -> None:
@@ -152,7 +154,7 @@ def test_a_run_holds_what_its_figure_needs(moves: dict[str, Any]) -> None:
 def test_an_undamped_mode_grows_at_half_the_gain(values: dict[str, Any]) -> None:
     """And drag of the size of the gain stops it; the simulations have more all along the way."""
     for x in (0.0, 20.0):
-        found = table7.stability(x)
+        found = work.stability(x)
         assert found["growth"] == pytest.approx(0.5 * values["gain"], rel=0.05)
         assert found["drag"] == pytest.approx(values["gain"], rel=0.05)
         assert found["drag"] < 0.6 * values["drag"]
@@ -201,7 +203,7 @@ def _results(final: np.ndarray, stray: float) -> dict[str, Any]:
     for x in ALONG:
         stable = {"growth": 0.03, "frequency": 0.2, "drag": 0.06, "damping": 0.02}
         results[f"stable_{x}"] = {**stable, "damping_time": 0.5 if x == 0 else np.inf}
-    results["fit"] = {"values": {n: assumed("table7")[n] for n in table7.COARSE}, "errors": final}
+    results["fit"] = {"values": {n: assumed("table7")[n] for n in work.COARSE}, "errors": final}
     return results
 
 

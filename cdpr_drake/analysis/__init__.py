@@ -8,7 +8,13 @@ from cdpr_drake.analysis.compare import (
 )
 from cdpr_drake.analysis.default_gain import DefaultGain, default_gain, lowest_gain
 from cdpr_drake.analysis.explore import Snapshot, explore_pose
-from cdpr_drake.analysis.gain_matrix import GainMap, GainMatrix, gain_matrix, map_gain_matrix
+from cdpr_drake.analysis.gain_matrix import (
+    GainMap,
+    GainMatrix,
+    gain_matrix,
+    map_gain_matrix,
+    target_twist,
+)
 from cdpr_drake.analysis.neutral import (
     NeutralDirections,
     internal_tension,
@@ -60,5 +66,6 @@ __all__ = [
     "stability_map",
     "step_error",
     "step_limit",
+    "target_twist",
     "warn_if_unstable",
 ]

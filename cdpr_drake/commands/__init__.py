@@ -1,6 +1,7 @@
 """The command line, a file each for its commands, and what a command is.
 
-Importing this imports no robot.
+An application of one command makes its `Command` and calls `run_command`. Importing this imports no
+robot: what else it offers is loaded when first asked for.
 """
 
 from __future__ import annotations
@@ -8,6 +9,25 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from cdpr_drake.commands.execution import run_command
+    from cdpr_drake.commands.files import DOTS_PER_INCH, staged, to_json
+    from cdpr_drake.commands.terminal import CaseProgress, print_message, print_wrapped
+
+__all__ = [
+    "DOTS_PER_INCH",
+    "EXIT_STATUS",
+    "CaseProgress",
+    "Command",
+    "UsageError",
+    "print_message",
+    "print_wrapped",
+    "run_command",
+    "staged",
+    "to_json",
+]
 
 EXIT_STATUS = (
     "0, done; 1, a run left what the model covers, or results could not be written; 2, the input "
@@ -46,3 +66,14 @@ class Command:
     add_arguments: Callable[[ArgumentParser], None] = _no_arguments
     example: str = ""
     exit_status: str = EXIT_STATUS
+
+
+def __getattr__(name: str) -> Any:
+    """Import what this offers by `name` when first asked for."""
+    if name in __all__:
+        from cdpr_drake.commands import execution, files, terminal
+
+        return next(
+            vars(place)[name] for place in (execution, files, terminal) if name in vars(place)
+        )
+    raise AttributeError(f"module 'cdpr_drake.commands' has no attribute '{name}'")

@@ -30,6 +30,11 @@ BUILT_IN = (
 )
 """Each a module here, in the order of the list of commands."""
 
+ELSEWHERE = {
+    "reproduce": "the reproduction is an application of the source checkout: make reproduce",
+}
+"""What is no command, though its name may be looked for among them, and where it is."""
+
 
 def find_command(name: str) -> Command:
     """Return a command, and import no other.
@@ -45,6 +50,8 @@ def find_command(name: str) -> Command:
     others = _added()
     if name not in others:
         message = f"argument COMMAND: invalid choice: {name!r}"
+        if name in ELSEWHERE:
+            raise UsageError(f"{message}; {ELSEWHERE[name]}")
         known = ", ".join((*BUILT_IN, *others))
         raise UsageError(f"{message}; commands are {known} (try {PROGRAM} --help)")
     return _load(others[name])

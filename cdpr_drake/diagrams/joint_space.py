@@ -10,6 +10,7 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.trajectories import Trajectory
 
 from cdpr_drake.diagrams.robot import make_plant
+from cdpr_drake.diagrams.timing import Timing
 from cdpr_drake.diagrams.wiring import SystemOrMaker, add_plant, add_reference, check_robot, finish
 from cdpr_drake.model.cable_models import cable_model_name
 from cdpr_drake.model.robot import CableRobot
@@ -33,6 +34,7 @@ class JointSpaceLoop:
     """
 
     controller: ClassVar[str] = "JSC"
+    timing: ClassVar[Timing] = Timing(sample_time=None, latency=0.0)
 
     cable_model: str = "SCMWE"
     believed: CableRobot | None = None

@@ -102,6 +102,11 @@ class VisionLoop:
         return self.law.gain if isinstance(self.law, ServoSettings) else None
 
     @property
+    def ramp_time(self) -> float:
+        """Over which the law's gain rises from zero at the start [s]."""
+        return self.law.ramp_time if isinstance(self.law, ServoSettings) else 0.0
+
+    @property
     def label(self) -> str:
         """A short name: "VBC" and the law's cable model, or what the law is called."""
         if isinstance(self.law, ServoSettings):

@@ -1,11 +1,13 @@
 """The paper's tests as data, and runs of them."""
 
 from cdpr_drake.runs.metrics import Summary
-from cdpr_drake.runs.paper_tests import PaperTest, paper_test
+from cdpr_drake.runs.paper_tests import NUMBERS, PaperTest, paper_test
 from cdpr_drake.runs.running import Prepared, Run, prepare, run
-from cdpr_drake.runs.setup import Setup, make_setup, setup_of_test
+from cdpr_drake.runs.setup import RECORD_PERIOD, Setup, make_setup, setup_of_test
 
 __all__ = [
+    "NUMBERS",
+    "RECORD_PERIOD",
     "PaperTest",
     "Prepared",
     "Run",

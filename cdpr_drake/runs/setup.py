@@ -71,7 +71,7 @@ class Setup:
                 raise ValueError(f"{name} must be positive and finite, got {value}")
         if self.until < RECORD_PERIOD:
             raise ValueError(f"a run takes at least {RECORD_PERIOD} s, got {self.until} s")
-        if isinstance(self.loop, VisionLoop) and not self.loop.timing.delay < self.until:
+        if not self.loop.timing.delay < self.until:
             raise ValueError(
                 f"the latency must be from 0 to below the run's {self.until:g} s, "
                 f"got {self.loop.timing.latency} s"
@@ -105,7 +105,7 @@ class Setup:
         Raises:
             TypeError: the loop has no such law.
         """
-        if self.paper_law is None or not isinstance(self.loop, VisionLoop):
+        if self.paper_law is None:
             raise TypeError(f"{self.label} is not vision-based control by the paper's law")
         return {
             "cable_model": self.paper_law.cable_model,

@@ -1,5 +1,6 @@
 """What a run looks like: figures, block diagrams, and replays that a browser plays."""
 
+from cdpr_drake.show import style
 from cdpr_drake.show.block_diagram import GraphvizError, block_diagram, block_diagram_dot
 from cdpr_drake.show.calibration_plots import calibration_figure
 from cdpr_drake.show.camera_views import camera_view_figure
@@ -8,6 +9,7 @@ from cdpr_drake.show.plots import (
     cable_sag,
     error_norm_figure,
     motor_rate_figure,
+    number_cables,
     pose_error_figure,
     sag_figure,
     save_figures,
@@ -33,6 +35,7 @@ __all__ = [
     "gain_map_figure",
     "mode_shape_figure",
     "motor_rate_figure",
+    "number_cables",
     "pole_figure",
     "pose_error_figure",
     "rates_and_responses_figure",
@@ -41,6 +44,7 @@ __all__ = [
     "screenshot_replay",
     "stability_figure",
     "stereo_view_figure",
+    "style",
     "tension_figure",
     "write_replay",
 ]

@@ -1,0 +1,1 @@
+"""How fast a robot may move before its cables, static in the paper and here, would vibrate."""

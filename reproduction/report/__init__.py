@@ -1,0 +1,1 @@
+"""How a report is shown: on a page, in pictures, in words."""

@@ -1,0 +1,1 @@
+"""What each slip of the printed equations would do to the controlled robot if left in."""
