@@ -5,6 +5,8 @@ What a system answers for it is in `systems.answers`.
 
 from __future__ import annotations
 
+import hashlib
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -42,8 +44,9 @@ def rest_context(
         pose: X_WP, or [roll, pitch, yaw, x, y, z] (rad, m).
         tensions: "minimum norm" (of the chord tensions), or "within limits"; without effect in a
             joint space loop.
-        seed: of the diagram's noise sources; None leaves them to Drake, whose seeds differ from
-            one context to the next.
+        seed: of the diagram's noise sources, each with a generator of its own by the seed and the
+            name of the source; None leaves them to Drake, whose seeds differ from one context to
+            the next.
 
     Raises:
         GeometryError, TensionError, EquilibriumError: the robot cannot rest there, or a block has
@@ -51,12 +54,12 @@ def rest_context(
         ValueError: the diagram has no cables.
     """
     context = diagram.CreateDefaultContext()
+    inside = list(blocks(diagram))
     if seed is not None:
-        diagram.SetRandomContext(context, RandomGenerator(seed))
+        _seed(inside, context, seed)
     X_WP = as_pose(pose)
     robot = robot_of(diagram)
     fix_inputs(diagram, context, {"desired_pose"}, pose_to_vector(X_WP))
-    inside = list(blocks(diagram))
     rest = _rest_of_weight(inside, robot, X_WP, tensions, None)
     wrench, scale = np.zeros(6), robot.mass * robot.gravity
     for _ in range(50):
@@ -136,6 +139,20 @@ def fix_inputs(diagram: Diagram, context: Context, ports: set[str], value: Array
     for name, _, fed in fed_ports(diagram):
         if fed in ports:
             diagram.GetInputPort(name).FixValue(context, value)
+
+
+def _seed(inside: Sequence[Block], context: Context, seed: int) -> None:
+    """Give each source of noise a generator of its own, by the seed and its name.
+
+    So what one draws does not depend on which others there are, or in which order. A source is
+    called like the port that it feeds; where two are called alike, their paths count.
+    """
+    names = Counter(block.path[-1] for block in inside)
+    for block in inside:
+        name = block.path[-1] if names[block.path[-1]] == 1 else "/".join(block.path)
+        digest = hashlib.sha256(f"{seed} {name}".encode()).digest()
+        generator = RandomGenerator(int.from_bytes(digest[:4], "little"))
+        block.system.SetRandomContext(block.context(context), generator)
 
 
 def _rest_of_weight(
