@@ -21,12 +21,12 @@ from cdpr_drake.diagrams import (
     rest_context,
     simulate,
 )
+from cdpr_drake.diagrams.blocks import continuous_state_names
 from cdpr_drake.diagrams.robot import ROBOT_OUTPUTS, make_plant
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.rotations import vector_to_pose
 from cdpr_drake.model.vision.outages import Outage
 from cdpr_drake.study import linearize
-from cdpr_drake.study.names import continuous_state_names
 from cdpr_drake.systems import ExponentialApproach, FusedPlant
 from cdpr_drake.systems.fused_plant import fused_refusal
 

@@ -31,11 +31,11 @@ from cdpr_drake.diagrams import (
     make_vision_based_control,
     rest_context,
 )
+from cdpr_drake.diagrams.blocks import continuous_state_names, discrete_state_names
 from cdpr_drake.errors import LinearizationError
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.study import LinearizationWarning, Linearizer, equilibrium, linearize
 from cdpr_drake.study.linear import vector_names
-from cdpr_drake.study.names import continuous_state_names, discrete_state_names
 from cdpr_drake.study.twin import twin_of
 from cdpr_drake.systems import ExponentialApproach
 

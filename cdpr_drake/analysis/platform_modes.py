@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.model.equilibrium import rest_state
 from cdpr_drake.model.rest_model import RestModel, rest_model
 from cdpr_drake.model.robot import CableRobot
-from cdpr_drake.model.signals import ERROR, TWIST
+from cdpr_drake.model.signals import POSE, TWIST
 from cdpr_drake.study.modes import Modes, modes_of
 
 
@@ -22,7 +22,8 @@ def platform_modes(
     """Return the modes of the platform on its cables at a rest.
 
     M dv/dt = K x + C v with the exact catenaries' stiffness K and damping C. With the winches under
-    control their own modes are there too.
+    control their own modes are there too. States are called as `linearize` calls those of
+    `make_cable_robot`.
 
     Args:
         robot: the robot, with its payload.
@@ -49,7 +50,7 @@ def rest_modes(model: RestModel, winches: str = "locked") -> Modes:
     """
     if winches not in ("locked", "controlled"):
         raise ValueError(f'winches are "locked" or "controlled", not "{winches}"')
-    names = tuple(f"platform/{part}" for part in ERROR + TWIST)
+    names = tuple(f"platform/{part}" for part in POSE + TWIST)
     if winches == "locked":
         return modes_of(model.locked(), names)
     groups = ("angle", "rate", "integral")

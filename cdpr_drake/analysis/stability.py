@@ -25,7 +25,7 @@ from cdpr_drake.diagrams.timing import Timing
 from cdpr_drake.model.camera import true_from_seen
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.servo import ServoSettings
-from cdpr_drake.model.signals import ERROR, TWIST
+from cdpr_drake.model.signals import ERROR, POSE, TWIST
 from cdpr_drake.study.modes import Mode, Modes, modes
 from cdpr_drake.study.sampled import OnePeriodMap, one_period_map
 from cdpr_drake.study.state_space import Array
@@ -92,11 +92,11 @@ class SampledServo:
         self._A[n : n + 6, n + 6 :] = np.eye(6)
         true = true_from_seen(robot, ours, gamma.pose)
         self._error = np.zeros((6, n + 6))
-        self._error[:, :6] = -np.linalg.inv(target_twist(robot, true))
+        self._error[:, :6] = -np.linalg.solve(target_twist(robot, true), gamma.rest.motion)
         self._flows: dict[float, Array] = {}
         numbers = range(1, k + 1)
         self._states = (
-            *(f"platform/{part}" for part in ERROR + TWIST),
+            *(f"platform/{part}" for part in POSE + TWIST),
             *(f"winches/{group}[{i}]" for group in ("angle", "rate", "integral") for i in numbers),
             *(f"servo/{part}" for part in ERROR),
             *(f"held_rates/{part}" for part in TWIST),

@@ -1,6 +1,12 @@
 """Robot and control loops as Drake diagrams, their rest contexts, and their simulation."""
 
-from cdpr_drake.diagrams.blocks import Block, blocks
+from cdpr_drake.diagrams.blocks import (
+    Block,
+    blocks,
+    continuous_state_names,
+    discrete_state_names,
+    hand_over,
+)
 from cdpr_drake.diagrams.joint_space import JointSpaceLoop, make_joint_space_control
 from cdpr_drake.diagrams.rendering import make_pose_camera_images, rendering_available
 from cdpr_drake.diagrams.rest import rest_context, robot_of, set_at_rest
@@ -30,6 +36,9 @@ __all__ = [
     "Timing",
     "VisionLoop",
     "blocks",
+    "continuous_state_names",
+    "discrete_state_names",
+    "hand_over",
     "make_cable_robot",
     "make_joint_space_control",
     "make_plant",

@@ -1,6 +1,7 @@
-"""The blocks of any diagram, what each answers about itself, and what Drake's own blocks answer.
+"""The blocks of any diagram, what each answers about itself, and what their states are called.
 
-What may be answered is in `systems.answers`.
+What may be answered is in `systems.answers`. The name of a state is the path of its block, then
+what the block says it is: "robot/platform/roll", "robot/winches/angle[3]", "held_rates[8]".
 """
 
 from __future__ import annotations
@@ -9,19 +10,10 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
-from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import JointIndex, RpyFloatingJoint
 from pydrake.systems.framework import Context, Diagram, System
-from pydrake.systems.primitives import (
-    DiscreteTimeDelay,
-    FirstOrderLowPassFilter,
-    RandomSource,
-    ZeroOrderHold,
-)
 
-from cdpr_drake.model.equilibrium import RestState
-from cdpr_drake.model.rotations import pose_to_vector
-from cdpr_drake.model.signals import POSE, TWIST, vector_names
+from cdpr_drake.diagrams.drake_blocks import answers_of
+from cdpr_drake.model.signals import joined, vector_names
 
 
 class Block(NamedTuple):
@@ -42,10 +34,7 @@ class Block(NamedTuple):
 
     def answer(self, name: str) -> Any:
         """Return the method or attribute `name` with which it answers, None if it does not."""
-        for kind, adapter in _ADAPTERS:
-            if isinstance(self.system, kind):
-                return getattr(adapter(self.system), name, None)
-        return getattr(self.system, name, None)
+        return getattr(answers_of(self.system), name, None)
 
     def context(self, root: Context) -> Context:
         """Return its own context, mutable, in that of the diagram, `root`."""
@@ -91,126 +80,84 @@ def fed_ports(diagram: Diagram) -> Iterator[tuple[str, tuple[str, ...], str]]:
                     yield port.get_name(), (block, *path), leaf_port
 
 
-def joined(block: str, entry: str) -> str:
-    """Return the name of an entry of a block: "block/entry", "block[3]".
+def continuous_state_names(system: System) -> tuple[str, ...]:
+    """Return the names of a system's continuous states, in its own order.
 
     Args:
-        block: its path.
-        entry: its name there.
+        system: a system or diagram.
     """
-    return f"{block}{entry}" if entry.startswith("[") or not entry else f"{block}/{entry}"
+    return tuple(name for block in blocks(system) for name in _continuous(block))
 
 
-class _Plant:
-    """What any MultibodyPlant answers: names of its joints' states."""
+def discrete_state_names(system: System) -> tuple[str, ...]:
+    """Return the names of a system's discrete states, group after group.
 
-    def __init__(self, plant: MultibodyPlant) -> None:
-        self._plant = plant
-
-    @property
-    def state_names(self) -> tuple[str, ...]:
-        plant = self._plant
-        if plant.time_step() > 0.0:
-            return ()
-        joints = [plant.get_joint(JointIndex(i)) for i in range(plant.num_joints())]
-        joints = [joint for joint in joints if joint.num_velocities()]
-        q = [f"q[{i + 1}]" for i in range(plant.num_positions())]
-        v = [f"v[{i + 1}]" for i in range(plant.num_velocities())]
-        for joint in joints:
-            prefix = f"{joint.name()}_" if len(joints) > 1 else ""
-            is_rpy = isinstance(joint, RpyFloatingJoint)
-            for i in range(joint.num_positions()):
-                suffix = POSE[i] if is_rpy else joint.position_suffix(i) or joint.name()
-                q[joint.position_start() + i] = prefix + suffix
-            for i in range(joint.num_velocities()):
-                suffix = TWIST[i] if is_rpy else joint.velocity_suffix(i) or f"{joint.name()}_rate"
-                v[joint.velocity_start() + i] = prefix + suffix
-        return (*q, *v)
+    Args:
+        system: a system or diagram.
+    """
+    return tuple(name for block in blocks(system) for name in _discrete(block))
 
 
-class _Platform(_Plant):
-    """What the plant of one rigid body on an RpyFloatingJoint answers."""
-
-    def set_at_rest(self, context: Context, rest: RestState) -> None:
-        state = np.concatenate([pose_to_vector(rest.X_WP), np.zeros(6)])
-        self._plant.SetPositionsAndVelocities(context, state)
-
-    def unbalanced_wrench(self, context: Context) -> np.ndarray:
-        rate = self._plant.EvalTimeDerivatives(context).CopyToVector()[6:]
-        unbalanced: np.ndarray = self._plant.CalcMassMatrix(context) @ rate
-        return unbalanced
-
-    def platform_scale(self, context: Context, torque: float, force: float) -> np.ndarray:
-        """Return scales of [d pose; d omega; d v] for the cables' largest torque and force."""
-        plant = self._plant
-        weight = plant.CalcGravityGeneralizedForces(context)
-        torque = max(torque, float(np.linalg.norm(weight[:3])))
-        force = max(force, float(np.linalg.norm(weight[3:])))
-        mass = np.diag(plant.CalcMassMatrix(context))
-        return np.concatenate([np.ones(6), torque / mass[:3], force / mass[3:]])
+def _continuous(block: Block) -> list[str]:
+    size, path = block.system.num_continuous_states(), "/".join(block.path)
+    own = block.answer("state_names") or ()
+    if len(own) != size:
+        own = [f"x[{i + 1}]" for i in range(size)]
+    return [joined(path, name) for name in own]
 
 
-def _of_plant(plant: MultibodyPlant) -> _Plant:
-    if plant.time_step() > 0.0 or plant.num_velocities() != 6:
-        return _Plant(plant)
-    joints = (plant.get_joint(JointIndex(i)) for i in range(plant.num_joints()))
-    on_rpy = any(isinstance(joint, RpyFloatingJoint) for joint in joints)
-    return _Platform(plant) if on_rpy else _Plant(plant)
+def _discrete(block: Block) -> list[str]:
+    sizes, path = block.group_sizes, "/".join(block.path)
+    own = block.answer("discrete_state_names") or ()
+    if sizes and len(own) == sum(sizes):
+        return [joined(path, name) for name in own]
+    return [
+        name
+        for group, size in enumerate(sizes)
+        for name in vector_names(path if len(sizes) == 1 else f"{path}/{group + 1}", size)
+    ]
 
 
-class _Hold:
-    """What a hold or delay line answers: all of it is what its input is now."""
+def hand_over(diagram: System, context: Context, other: System, target: Context) -> tuple[str, ...]:
+    """Put time and states of one diagram into another by their names: a run that goes on there.
 
-    def __init__(self, system: ZeroOrderHold | DiscreteTimeDelay) -> None:
-        self._system = system
+    Blocks of the same path and kind hand over their abstract state too: generators of noise. What
+    has no namesake stays as it is in the other; parameters and inputs do.
 
-    def settle(self, context: Context) -> None:
-        value = self._system.get_input_port().Eval(context)
-        size = context.get_discrete_state_vector().size()
-        context.SetDiscreteState(np.tile(value, size // value.size))
+    Args:
+        diagram: whose states are handed over.
+        context: its context.
+        other: gets them, e.g. the same loop around a robot that has picked something up.
+        target: the other's context, changed.
 
-
-class _Delay(_Hold):
-    @property
-    def discrete_state_names(self) -> tuple[str, ...]:
-        """The oldest sample comes first, the latest last."""
-        name, width = self._system.get_name(), self._system.get_output_port().size()
-        context = self._system.CreateDefaultContext()
-        ages = reversed(range(context.get_discrete_state_vector().size() // width))
-        entries = [n.removeprefix(name).removeprefix("/") for n in vector_names(name, width)]
-        return tuple(
-            joined(f"{age}_frames_ago", entry) if age else entry
-            for age in ages
-            for entry in entries
-        )
-
-
-class _Filter:
-    """What a low-pass filter answers."""
-
-    def __init__(self, system: FirstOrderLowPassFilter) -> None:
-        self._system = system
-
-    def settle(self, context: Context) -> None:
-        context.SetContinuousState(self._system.get_input_port().Eval(context))
+    Returns:
+        the names of the other's states that were not given any.
+    """
+    target.SetTime(context.get_time())
+    given = {block.path: block for block in blocks(diagram)}
+    values = dict(zip(*_named_states(diagram, context), strict=True))
+    names, mine = _named_states(other, target)
+    _set_states(target, np.array([values.get(n, v) for n, v in zip(names, mine, strict=True)]))
+    for block in blocks(other):
+        source = given.get(block.path)
+        if source is not None and type(source.system) is type(block.system):
+            theirs, own = source.context(context), block.context(target)
+            for i in range(min(s.system.num_abstract_states() for s in (source, block))):
+                own.get_mutable_abstract_state(i).SetFrom(theirs.get_abstract_state(i))
+    return tuple(name for name in names if name not in values)
 
 
-class _Source:
-    """What a source of noise answers: its sample is at rest until it draws the next."""
-
-    never_rests = True
-
-    def __init__(self, system: RandomSource) -> None:
-        pass
-
-    def settle(self, context: Context) -> None:
-        """Keep the sample."""
+def _named_states(system: System, context: Context) -> tuple[tuple[str, ...], np.ndarray]:
+    discrete = context.get_discrete_state()
+    groups = [discrete.get_vector(i).CopyToVector() for i in range(discrete.num_groups())]
+    names = continuous_state_names(system) + discrete_state_names(system)
+    return names, np.concatenate([context.get_continuous_state_vector().CopyToVector(), *groups])
 
 
-_ADAPTERS: tuple[tuple[type, Any], ...] = (
-    (MultibodyPlant, _of_plant),
-    (DiscreteTimeDelay, _Delay),
-    (ZeroOrderHold, _Hold),
-    (FirstOrderLowPassFilter, _Filter),
-    (RandomSource, _Source),
-)
+def _set_states(context: Context, values: np.ndarray) -> None:
+    n = context.get_continuous_state_vector().size()
+    context.SetContinuousState(values[:n])
+    for group in range(context.get_discrete_state().num_groups()):
+        size = context.get_discrete_state(group).size()
+        context.SetDiscreteState(group, values[n : n + size])
+        n += size

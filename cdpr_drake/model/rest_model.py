@@ -13,7 +13,7 @@ from cdpr_drake.model.cables import CableSet
 from cdpr_drake.model.equilibrium import RestState
 from cdpr_drake.model.kinematics import D_Bf, cable_geometry
 from cdpr_drake.model.robot import CableRobot
-from cdpr_drake.model.rotations import Array, skew
+from cdpr_drake.model.rotations import Array, pose_to_vector, rpy_rate_matrix, skew
 from cdpr_drake.model.winch import WinchModel
 
 
@@ -53,17 +53,27 @@ class RestModel:
         """dx/dl (6, k) = -K^-1 dW/dl: how the platform settles when lengths change."""
         return -np.asarray(np.linalg.solve(self.stiffness, self.wrench_per_length), float)
 
+    @property
+    def motion(self) -> Array:
+        """dx/dq (6, 6): a motion [rotation; translation] by [roll, pitch, yaw, x, y, z]."""
+        E = np.eye(6)
+        E[:3, :3] = rpy_rate_matrix(pose_to_vector(self.rest.X_WP)[:3])
+        return E
+
     def locked(self) -> Array:
-        """Return A (12, 12) of d[x; velocity]/dt with the winches locked: M dv/dt = K x + C v."""
-        A = np.zeros((12, 12))
-        A[:6, 6:] = np.eye(6)
-        A[6:] = np.linalg.solve(self.mass, np.hstack([self.stiffness, self.damping]))
+        """Return A (12, 12) of d[q; velocity]/dt with the winches locked: M dv/dt = K x + C v.
+
+        q is [roll, pitch, yaw, x, y, z] (rad, m), the platform's coordinates in diagrams.
+        """
+        A, E = np.zeros((12, 12)), self.motion
+        A[:6, 6:] = np.linalg.inv(E)
+        A[6:] = np.linalg.solve(self.mass, np.hstack([self.stiffness @ E, self.damping]))
         return A
 
     def controlled(self) -> tuple[Array, Array]:
         """Return A (12 + 3 k, 12 + 3 k), B (12 + 3 k, k) with the winches under their PID.
 
-        State: [x; velocity; motor angles; rates; integrals]; input: desired motor angles [rad].
+        State: [q; velocity; motor angles; rates; integrals]; input: desired motor angles [rad].
         """
         k = self.robot.num_cables
         winch = self.robot.winch
@@ -74,7 +84,8 @@ class RestModel:
         push = np.hstack([self.wrench_per_length, self.wrench_per_rate])
         A[6:12] += np.linalg.solve(self.mass, push) @ lengths
         tension = self.tension[:, 12:] @ lengths
-        tension[:, :12] += self.tension[:, :12]
+        tension[:, :6] += self.tension[:, :6] @ self.motion
+        tension[:, 6:12] += self.tension[:, 6:12]
         jacobian = self._winch_jacobian()
         A[12:, 12:] = jacobian[:, : 3 * k]
         A[12:] += jacobian[:, 4 * k :] @ tension

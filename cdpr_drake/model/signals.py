@@ -29,3 +29,13 @@ def vector_names(name: str, size: int) -> tuple[str, ...]:
     if "tangents" in name and size % 3 == 0:
         return tuple(f"{name}[{i // 3 + 1}]/{'xyz'[i % 3]}" for i in range(size))
     return tuple(f"{name}[{i + 1}]" for i in range(size)) if size > 1 else (name,)
+
+
+def joined(block: str, entry: str) -> str:
+    """Return the name of an entry of a block: "block/entry", "block[3]".
+
+    Args:
+        block: its path.
+        entry: its name there.
+    """
+    return f"{block}{entry}" if entry.startswith("[") or not entry else f"{block}/{entry}"

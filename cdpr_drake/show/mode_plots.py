@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 
 from cdpr_drake.analysis.stability import StabilityMap
 from cdpr_drake.model.kinematics import cable_ends
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, pose_to_vector, vector_to_pose
-from cdpr_drake.model.signals import ERROR, POSE
+from cdpr_drake.model.signals import POSE
 from cdpr_drake.show.plots import _figure, _legend_below, spread
 from cdpr_drake.show.style import REFERENCE, RUN_COLOURS, cable_colour
 from cdpr_drake.study.modes import Mode, Modes
@@ -280,41 +280,27 @@ def _draw_circle(axes: Axes, models: Mapping[str, Modes]) -> None:
     axes.set_ylabel("Im $z$")
 
 
-def _platform_shape(found: Modes, mode: Mode) -> tuple[np.ndarray, bool]:
-    """Return a mode's six platform entries, and whether they are of a pose vector."""
-    for names, is_pose in ((POSE, True), (ERROR, False)):
-        where = [
-            i
-            for name in names
-            for i, state in enumerate(found.states)
-            if state.split("/")[-2:] == ["platform", name]
-        ]
-        if len(where) == 6:
-            return mode.shape[where], is_pose
-    raise ValueError("the platform's pose is not among the states of these modes")
+def _platform_shape(found: Modes, mode: Mode) -> np.ndarray:
+    """Return a mode's six entries of the platform's pose."""
+    where = [
+        i
+        for name in POSE
+        for i, state in enumerate(found.states)
+        if state.split("/")[-2:] == ["platform", name]
+    ]
+    if len(where) != 6:
+        raise ValueError("the platform's pose is not among the states of these modes")
+    return mode.shape[where]
 
 
-def _moved(
-    X_WP: RigidTransform, change: np.ndarray, is_pose: bool, points: np.ndarray
-) -> np.ndarray:
+def _moved(X_WP: RigidTransform, change: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Return where points of the platform (n, 3) are after a change of its pose (6,)."""
-    if is_pose:
-        X = vector_to_pose(pose_to_vector(X_WP) + change)
-    else:
-        from pydrake.common.eigen_geometry import AngleAxis
-
-        angle = float(np.linalg.norm(change[:3]))
-        axis = change[:3] / angle if angle > 0.0 else np.array([0.0, 0.0, 1.0])
-        R = RotationMatrix(AngleAxis(angle, axis)) @ X_WP.rotation()
-        X = RigidTransform(R, X_WP.translation() + change[3:])
+    X = vector_to_pose(pose_to_vector(X_WP) + change)
     return np.asarray((X @ points.T).T, float)
 
 
-def _draw_motion(
-    axes: Any, shape: tuple[np.ndarray, bool], robot: CableRobot, X_WP: RigidTransform
-) -> None:
+def _draw_motion(axes: Any, values: np.ndarray, robot: CableRobot, X_WP: RigidTransform) -> None:
     """Draw the platform at rest, at the ends of its motion, and the ways of its corners."""
-    values, is_pose = shape
     B = robot.attachment_points
     low, high = B.min(axis=0), B.max(axis=0)
     size = float(np.linalg.norm(high - low))
@@ -322,13 +308,13 @@ def _draw_motion(
     scale = ENLARGED * size / reach if reach > 0.0 else 0.0
     values = values * np.exp(-1j * np.angle(values[np.argmax(np.abs(values))]))  # ends at 0 and pi
     cycle = values * np.exp(1j * np.linspace(0.0, 2.0 * math.pi, 61))[:, None]
-    way = np.array([_moved(X_WP, scale * x.real, is_pose, B) for x in cycle])
+    way = np.array([_moved(X_WP, scale * x.real, B) for x in cycle])
     corners = np.array(list(itertools.product(*zip(low, high, strict=True))))
     ends = [np.zeros(6), scale * cycle[0].real, scale * cycle[30].real]
     for change, colour, width in zip(
         ends, ("0.45", RUN_COLOURS[0], RUN_COLOURS[1]), (1.0, 1.6, 1.6), strict=True
     ):
-        box = _moved(X_WP, change, is_pose, corners)
+        box = _moved(X_WP, change, corners)
         for i, j in itertools.combinations(range(8), 2):
             if (i ^ j).bit_count() == 1:
                 axes.plot(*box[[i, j]].T, color=colour, linewidth=width)

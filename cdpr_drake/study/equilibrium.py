@@ -10,14 +10,13 @@ from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, Diagram
 
-from cdpr_drake.diagrams.blocks import Block, blocks
+from cdpr_drake.diagrams.blocks import Block, blocks, continuous_state_names, discrete_state_names
 from cdpr_drake.diagrams.rest import TOLERANCE, cables_of, fix_inputs, rest_context, robot_of
 from cdpr_drake.errors import EquilibriumError, GeometryError, TensionError
 from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, pose_to_vector
 from cdpr_drake.model.statics import weight_wrench, wrench_matrix
-from cdpr_drake.study.names import continuous_state_names, discrete_state_names
 from cdpr_drake.study.state_space import Array
 
 

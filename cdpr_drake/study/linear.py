@@ -8,11 +8,10 @@ from collections.abc import Iterable
 import numpy as np
 from pydrake.systems.framework import Context, Diagram, InputPort, OutputPort, PortDataType
 
-from cdpr_drake.diagrams.blocks import blocks
+from cdpr_drake.diagrams.blocks import blocks, continuous_state_names
 from cdpr_drake.errors import LinearizationError
 from cdpr_drake.model.signals import vector_names
 from cdpr_drake.study.first_order import first_order, port_value
-from cdpr_drake.study.names import continuous_state_names
 from cdpr_drake.study.state_space import StateSpace
 from cdpr_drake.study.twin import open_ports_named
 

@@ -18,11 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.framework import Context, Diagram
 
-from cdpr_drake.diagrams.blocks import blocks
+from cdpr_drake.diagrams.blocks import blocks, continuous_state_names, discrete_state_names
 from cdpr_drake.errors import LinearizationError
 from cdpr_drake.study.first_order import first_order
 from cdpr_drake.study.linear import LinearizationWarning, warn_on_ramp
-from cdpr_drake.study.names import continuous_state_names, discrete_state_names
 from cdpr_drake.study.state_space import EQUILIBRIUM_TOLERANCE, Array
 from cdpr_drake.study.twin import open_ports_named, twin_of, value_and_gradient
 

@@ -172,9 +172,9 @@ class FusedPlant(LeafSystem):
 
     def unbalanced_wrench(self, context: Context) -> Array:
         """Return [torque; force] (6,) that the platform is out of balance by in a `context`."""
-        rate = self.EvalTimeDerivatives(context).CopyToVector()[6:12]
-        X_WP = vector_to_pose(self._state_port.Eval(context)[:6])
-        unbalanced: Array = mass_matrix(self.robot, X_WP.rotation().matrix()) @ rate
+        acceleration = self.GetOutputPort("platform_acceleration").Eval(context)
+        R_WP = vector_to_pose(self._state_port.Eval(context)[:6]).rotation().matrix()
+        unbalanced: Array = mass_matrix(self.robot, R_WP) @ acceleration
         return unbalanced
 
     def reading(self, tension_at_winch: Array) -> Array:
