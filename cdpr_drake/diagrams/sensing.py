@@ -114,24 +114,15 @@ class GaussianSensing:
                     "with Gaussian noise: take TargetSensing or ImageSensing"
                 )
 
-    def add_to(self, builder: DiagramBuilder, plant: PlantToMeasure) -> Measurements:
+    def add_to(
+        self, builder: DiagramBuilder, plant: PlantToMeasure, without: tuple[str, ...] = ()
+    ) -> Measurements:
         """Add the sensors; see `Sensing`.
 
         Args:
             builder: of the loop.
             plant: what is measured.
-        """
-        return self.measure(builder, plant)
-
-    def measure(
-        self, builder: DiagramBuilder, plant: PlantToMeasure, without: tuple[str, ...] = ()
-    ) -> Measurements:
-        """Add the sensors, without those of "tensions" or "tangents".
-
-        Args:
-            builder: of the loop.
-            plant: what is measured.
-            without: what is not measured.
+            without: "tensions" or "tangents" that are not measured.
         """
         camera = CameraMeasurement(plant.robot, plant.believed)
         builder.AddNamedSystem("camera", camera)
@@ -173,28 +164,19 @@ class TargetSensing:
             known = ", ".join(ESTIMATORS)
             raise ValueError(f'unknown estimator "{self.estimator}"; known are {known}')
 
-    def add_to(self, builder: DiagramBuilder, plant: PlantToMeasure) -> Measurements:
+    def add_to(
+        self, builder: DiagramBuilder, plant: PlantToMeasure, without: tuple[str, ...] = ()
+    ) -> Measurements:
         """Add the sensors; see `Sensing`.
 
         Args:
             builder: of the loop.
             plant: what is measured.
+            without: "tensions" or "tangents" that are not measured.
 
         Raises:
             RobotFileError: the robot lacks the cameras or patterns they need.
             ValueError: no sampling or no latency; an outage of a camera that is not there.
-        """
-        return self.measure(builder, plant)
-
-    def measure(
-        self, builder: DiagramBuilder, plant: PlantToMeasure, without: tuple[str, ...] = ()
-    ) -> Measurements:
-        """Add the sensors, without those of "tensions" or "tangents".
-
-        Args:
-            builder: of the loop.
-            plant: what is measured.
-            without: what is not measured.
         """
         if plant.timing.sample_time is None:
             raise ValueError("cameras that see take images: give a sample time")
@@ -344,7 +326,7 @@ class ModelledSensing:
             builder: of the loop.
             plant: what is measured.
         """
-        return self.cameras.measure(builder, plant, self.modelled)
+        return self.cameras.add_to(builder, plant, self.modelled)
 
 
 SENSORS = ("gaussian", "targets", "images")
