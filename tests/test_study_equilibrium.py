@@ -163,7 +163,10 @@ def test_a_sample_that_is_out_of_date_is_a_residual(cogiro: CableRobot) -> None:
 def test_where_no_tensions_hold_the_platform_the_error_says_so(cogiro: CableRobot) -> None:
     diagram = make_vision_based_control(cogiro)
     outside = [0.0, 0.0, 0.0, 9.0, 9.0, 1.0]
-    with pytest.raises(EquilibriumError, match=r"cable \d.*residual of 0\.7\d of the weight"):
+    with pytest.raises(
+        EquilibriumError,
+        match=r"need cable \d to push.*outside the wrench-feasible workspace: .*give way by \d",
+    ):
         equilibrium(diagram, outside)
     with pytest.raises(EquilibriumError, match=r"cable \d.*residual of"):
         equilibrium(diagram, [0.0, 0.0, 0.0, 6.0, 0.0, 1.0], "within limits")
@@ -174,7 +177,7 @@ def test_other_tensions_are_proposed_where_they_exist(cogiro: CableRobot) -> Non
     diagram = make_vision_based_control(robot)
     pose = [0.36, -0.3, 0.29, -5.73, -1.07, 2.05]
     equilibrium(diagram, pose, "within limits")
-    with pytest.raises(EquilibriumError, match=r'push.*try tensions="within limits"'):
+    with pytest.raises(EquilibriumError, match=r'push.*the rule "within limits" finds some'):
         equilibrium(diagram, pose)
 
 

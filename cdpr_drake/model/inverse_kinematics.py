@@ -9,8 +9,10 @@ from pydrake.math import RigidTransform
 from cdpr_drake.errors import GeometryError, TensionError
 from cdpr_drake.model.arrays import RobotArrays
 from cdpr_drake.model.cable_models import cable_model_index, cable_model_name
+from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, as_pose, pose_to_vector
+from cdpr_drake.model.statics import weight_wrench, what_limits_allow, wrench_matrix
 
 
 class InverseKinematics:
@@ -67,9 +69,13 @@ class InverseKinematics:
         if status < 0:
             raise GeometryError("the wrench matrix has rank below 6 at the desired pose")
         if status > 0:
+            geometry = cable_geometry(self.robot, pose)
+            wrench = weight_wrench(self.robot, geometry)
+            allowed = what_limits_allow(self.robot, wrench_matrix(geometry), wrench)
             raise TensionError(
-                f"at the desired pose {np.array2string(pose, precision=3)} cable {status} "
-                "would have to push: it is outside the wrench-feasible workspace"
+                f"at the desired pose {np.array2string(pose, precision=3)} the tensions of least "
+                f"norm would need cable {status} to push, and joint space control takes no others; "
+                f"{allowed}"
             )
         return out + self.robot.cable.drum_run, jacobian
 

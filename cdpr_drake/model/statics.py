@@ -18,11 +18,10 @@ from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import GeometryError, TensionError
+from cdpr_drake.model.distribution import RANK_TOLERANCE, bounded_distribution, feasibility_margin
 from cdpr_drake.model.kinematics import D_B, CableGeometry, D_Bf, D_u, cable_geometry
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, as_pose, numbers, skew
-
-RANK_TOLERANCE = 1e-6
 
 
 def wrench_at(arm: Array, force: Array) -> Array:
@@ -175,60 +174,6 @@ def minimum_norm_horizontal_tensions(robot: CableRobot, pose: RigidTransform | A
     return distribute(robot, matrix, weight_wrench(robot, geometry), "minimum norm", X_WP)
 
 
-def bounded_distribution(
-    matrix: ArrayLike, wrench: ArrayLike, lower: ArrayLike, upper: ArrayLike, preferred: ArrayLike
-) -> Array:
-    """Return t (k,), the closest to `preferred` with matrix t = wrench and lower <= t <= upper.
-
-    Solved exactly, as a least-distance problem in the null space of the wrench matrix (Lawson and
-    Hanson, Solving Least Squares Problems, chapter 23).
-
-    Args:
-        matrix: (6, k) wrench matrix.
-        wrench: (6,) wrench to balance.
-        lower: (k,) or scalar lower bounds [N].
-        upper: (k,) or scalar upper bounds [N].
-        preferred: (k,) or scalar tensions to stay close to [N].
-
-    Raises:
-        TensionError: no tensions within the bounds balance the wrench.
-    """
-    A = np.asarray(matrix, float)
-    k = A.shape[1]
-    lower, upper, preferred = (
-        np.broadcast_to(np.asarray(x, float), (k,)) for x in (lower, upper, preferred)
-    )
-    wrench = np.asarray(wrench, float)
-    particular = np.linalg.lstsq(A, wrench, rcond=None)[0]
-    if np.abs(A @ particular - wrench).max() > RANK_TOLERANCE * np.abs(wrench).max():
-        raise TensionError("no tensions at all balance the wrench: the matrix does not span it")
-    _, singular, Vt = np.linalg.svd(A)
-    null = Vt[int(np.sum(singular > RANK_TOLERANCE * singular[0])) :].T
-    centre = particular + null @ (null.T @ (preferred - particular))
-    if np.all(centre >= lower) and np.all(centre <= upper):
-        return np.asarray(centre, float)
-    if null.shape[1] == 0:
-        raise TensionError("the only tensions that balance the wrench leave their limits")
-    from scipy.optimize import nnls  # takes 0.4 s to import
-
-    scale = float(np.max(upper - lower))
-    G = np.vstack([null, -null])
-    h = np.concatenate([lower - centre, centre - upper]) / scale
-    # Least distance: min |y| with G y >= h, from the nonnegative least squares of [G h]^T u = e.
-    E = np.vstack([G.T, h])
-    f = np.zeros(E.shape[0])
-    f[-1] = 1.0
-    u, residual_norm = nnls(E, f)
-    residual = E @ u - f
-    if residual_norm < 1e-10:
-        worst = int(np.argmax(np.maximum(lower - centre, centre - upper)))
-        raise TensionError(
-            f"no tensions between {lower.min():g} and {upper.max():g} N balance the wrench; "
-            f"cable {worst + 1} is the furthest out ({centre[worst]:.1f} N)"
-        )
-    return np.clip(centre + null @ (-residual[:-1] / residual[-1]) * scale, lower, upper)
-
-
 def tension_distribution(
     robot: CableRobot, pose: RigidTransform | ArrayLike, rule: str = "minimum norm"
 ) -> Array:
@@ -273,7 +218,7 @@ def distribute(
         if tensions[worst] <= 0.0:
             raise TensionError(
                 f"minimum-norm tensions at {_describe(X_WP)} would need cable {worst + 1} to push "
-                f"({tensions[worst]:.1f} N): the pose is outside the wrench-feasible workspace"
+                f"({tensions[worst]:.1f} N): {what_limits_allow(robot, matrix, wrench)}"
             )
         return tensions
     if rule != "within limits":
@@ -282,7 +227,33 @@ def distribute(
     try:
         return bounded_distribution(matrix, wrench, low, high, 0.5 * (low + high))
     except TensionError as error:
-        raise TensionError(f"at {_describe(X_WP)}: {error}") from None
+        allowed = what_limits_allow(robot, matrix, wrench)
+        raise TensionError(f"at {_describe(X_WP)}: {error}; {allowed}") from None
+
+
+def what_limits_allow(robot: CableRobot, matrix: Array, wrench: Array) -> str:
+    """Return in words whether tensions within a robot's limits balance a wrench, and how well.
+
+    A linear programme decides, see `feasibility_margin`.
+
+    Args:
+        robot: the robot, for its limits.
+        matrix: (6, k) wrench per unit of tension.
+        wrench: (6,) to balance.
+    """
+    low, high = robot.cable.min_tension, robot.cable.max_tension
+    margin = feasibility_margin(matrix, wrench, low, high).margin
+    limits = f"the limits of {low:g} to {high:g} N"
+    if margin >= 0.0:
+        return (
+            f'tensions {margin:.3g} N inside {limits} hold it: the rule "within limits" finds some'
+        )
+    if margin == -np.inf:
+        return "no tensions at all hold the weight there"
+    return (
+        f"the pose is outside the wrench-feasible workspace: {limits} would have to give way by "
+        f"{-margin:.3g} N"
+    )
 
 
 def _describe(X_WP: RigidTransform) -> str:

@@ -13,10 +13,7 @@ from pydrake.systems.framework import Context, Diagram
 from cdpr_drake.diagrams.blocks import Block, blocks, continuous_state_names, discrete_state_names
 from cdpr_drake.diagrams.rest import TOLERANCE, cables_of, fix_inputs, rest_context, robot_of
 from cdpr_drake.errors import EquilibriumError, GeometryError, TensionError
-from cdpr_drake.model.kinematics import cable_geometry
-from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, pose_to_vector
-from cdpr_drake.model.statics import weight_wrench, wrench_matrix
 from cdpr_drake.study.state_space import Array
 
 
@@ -53,7 +50,7 @@ def equilibrium(
     try:
         context = rest_context(loop, true, tensions)
     except (TensionError, GeometryError) as error:  # these name the limiting cable
-        raise EquilibriumError(f"{error}; {_shortfall(robot_of(loop), true, tensions)}") from None
+        raise EquilibriumError(str(error)) from None
     fix_inputs(loop, context, {"desired_pose"}, pose_to_vector(desired))
     context.SetTime(settled_time(loop))
     rest = residuals(loop, context)
@@ -198,19 +195,3 @@ def _slackest_cable(loop: Diagram, context: Context) -> str:
     tension = port.Eval(cables.context(context))
     i = int(np.argmin(tension))
     return f"{i + 1} ({tension[i]:.1f} N at the drawing point)"
-
-
-def _shortfall(robot: CableRobot, X_WP: RigidTransform, tensions: str) -> str:
-    """Say what the best tensions allowed leave of the weight's wrench."""
-    from scipy.optimize import lsq_linear
-
-    bounds = (0.0, np.inf)
-    if tensions == "within limits":
-        bounds = (robot.cable.min_tension, robot.cable.max_tension)
-    geometry = cable_geometry(robot, X_WP)
-    matrix, weight = wrench_matrix(geometry), weight_wrench(robot, geometry)
-    best = lsq_linear(matrix, weight, bounds)
-    residual = float(np.linalg.norm(matrix @ best.x - weight) / np.linalg.norm(weight))
-    if residual < 1e-9:
-        return 'other tensions balance it: try tensions="within limits"'
-    return f"whatever the tensions allowed, a residual of {residual:.2g} of the weight remains"
