@@ -182,9 +182,11 @@ def setup_of_test(number: int, robot: CableRobot | None = None, **changes: Any) 
         "start": start,
         "goal": goal,
         "until": test.duration,
-        "gain": test.gain,
     }
-    if isinstance(changes.get("loop", VisionLoop()), VisionLoop):
+    loop = changes.get("loop", VisionLoop())
+    if isinstance(loop, VisionLoop):
         cameras = robot.cameras
         values |= {"sample_time": cameras.sample_time, "latency": cameras.latency}
+    if isinstance(changes.get("law", getattr(loop, "law", ServoSettings())), ServoSettings):
+        values["gain"] = test.gain
     return make_setup(**{**values, **changes})
