@@ -78,7 +78,7 @@ def both(robot: CableRobot, **options: Any) -> list[tuple[Any, Any]]:
     pairs = []
     for fused in (False, True):
         loop = make_vision_based_control(robot, fast=fused, **{**OPTIONS, **options})
-        pairs.append((loop, rest_context(loop, POSE, seed=3)))
+        pairs.append((loop, rest_context(loop, POSE, "minimum norm", seed=3)))
     return pairs
 
 

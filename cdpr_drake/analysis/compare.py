@@ -16,6 +16,7 @@ from pydrake.math import RigidTransform
 from cdpr_drake.analysis.gain_matrix import GainMatrix, gain_matrix
 from cdpr_drake.model.cable_models import CABLE_MODELS, cable_model_name
 from cdpr_drake.model.robot import CableRobot, load_robot
+from cdpr_drake.model.statics import DEFAULT_RULE
 
 ROBOTS = ("cogiro", "cogiro-22m", "cogiro-37m", "cogiro-98m")
 """CoGiRo and its three larger versions (the paper's Table 6)."""
@@ -93,7 +94,7 @@ def compare_cable_models(
     poses: Mapping[str, RigidTransform | ArrayLike] | None = None,
     believed: Mapping[str, CableRobot] | None = None,
     move: float = 0.1,
-    tensions: str = "minimum norm",
+    tensions: str = DEFAULT_RULE,
 ) -> Comparison:
     """Return the gain matrices of cable models on robots, with rates and excursions.
 
@@ -104,7 +105,7 @@ def compare_cable_models(
             `comparable_pose` for those not given.
         believed: the robots as the controller knows them, by name; the true ones if not given.
         move: length of the moves judged, as a share of the robot's size.
-        tensions: "minimum norm" (of the chord tensions), or "within limits".
+        tensions: one of `model.statics.RULES`.
 
     Raises:
         GeometryError, TensionError, EquilibriumError: a robot cannot rest at its pose.

@@ -23,6 +23,7 @@ from cdpr_drake.errors import CdprError, PredictionError
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, pose_to_vector
 from cdpr_drake.model.servo import CUSTOMARY_GAIN
+from cdpr_drake.model.statics import DEFAULT_RULE
 
 SHARE_OF_LIMIT = 0.5
 """The most that a gain is of its limit unless somebody asks for more."""
@@ -89,7 +90,7 @@ def default_gain(
     latency: float = 0.04,
     *,
     believed: CableRobot | None = None,
-    tensions: str = "minimum norm",
+    tensions: str = DEFAULT_RULE,
     customary: float = CUSTOMARY_GAIN,
     share: float = SHARE_OF_LIMIT,
 ) -> DefaultGain:
@@ -107,7 +108,7 @@ def default_gain(
         sample_time: of the vision loop [s]; None for an all-continuous loop.
         latency: from image to change of the motor rates [s].
         believed: the robot as the controller knows it; the true one if None.
-        tensions: "minimum norm" (of the chord tensions), or "within limits".
+        tensions: one of `model.statics.RULES`.
         customary: [1/s], the gain where the limit does not matter.
         share: the most that the gain may be of its limit.
 
@@ -153,7 +154,7 @@ def predicted_limit(
     latency: float = 0.04,
     *,
     believed: CableRobot | None = None,
-    tensions: str = "minimum norm",
+    tensions: str = DEFAULT_RULE,
     highest: float,
 ) -> GainLimit:
     """Return the gain limit of a loop up to some gain, of a continuous one too.
@@ -167,7 +168,7 @@ def predicted_limit(
         sample_time: of the vision loop [s]; None for an all-continuous loop.
         latency: from image to change of the motor rates [s].
         believed: the robot as the controller knows it; the true one if None.
-        tensions: "minimum norm" (of the chord tensions), or "within limits".
+        tensions: one of `model.statics.RULES`.
         highest: gain [1/s] to search up to.
 
     Raises:

@@ -17,6 +17,7 @@ from cdpr_drake.model.cable_models import cable_model_name
 from cdpr_drake.model.rest_model import RestModel
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, pose_to_vector
+from cdpr_drake.model.statics import DEFAULT_RULE
 from cdpr_drake.study.modes import Mode, Modes
 from cdpr_drake.study.state_space import Array
 
@@ -100,7 +101,7 @@ def explore_pose(
     cable_model: str = "SCMWE",
     *,
     gain: float = 0.1,
-    tensions: str = "minimum norm",
+    tensions: str = DEFAULT_RULE,
 ) -> Snapshot:
     """Return tensions, modes, gain matrix and stability of a robot at rest at a pose.
 
@@ -111,7 +112,7 @@ def explore_pose(
         pose: X_WP, or [roll, pitch, yaw, x, y, z] (rad, m).
         cable_model: of the law, "ECM", "CMWE", "SCMWE" or "SLSM".
         gain: lambda [1/s] of the loop, sampled and late as the robot's cameras are.
-        tensions: "minimum norm" (of the chord tensions), or "within limits".
+        tensions: one of `model.statics.RULES`.
 
     Raises:
         ValueError: an unknown cable model or rule, or a gain that is not positive.

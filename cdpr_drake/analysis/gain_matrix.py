@@ -28,6 +28,7 @@ from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, pose_to_vector
 from cdpr_drake.model.servo import MotorRateLaw, ServoSettings
 from cdpr_drake.model.signals import TWIST
+from cdpr_drake.model.statics import DEFAULT_RULE
 from cdpr_drake.study.response import excursion, free_response
 from cdpr_drake.study.state_space import Array
 
@@ -108,7 +109,7 @@ def gain_matrix(
     pose: RigidTransform | ArrayLike,
     cable_model: str = "SCMWE",
     *,
-    tensions: str = "minimum norm",
+    tensions: str = DEFAULT_RULE,
     settings: ServoSettings | None = None,
 ) -> GainMatrix:
     """Return Gamma = T^-1 (dx/dl) D^_a T^: twist had per twist asked for, of M in M.
@@ -123,7 +124,7 @@ def gain_matrix(
         believed: the robot as the controller knows it; the true one if None.
         pose: X_WP where the controller sees the platform, or [roll, pitch, yaw, x, y, z] (rad, m).
         cable_model: the law's "ECM", "CMWE", "SCMWE" or "SLSM".
-        tensions: "minimum norm" (of the chord tensions), or "within limits".
+        tensions: one of `model.statics.RULES`.
         settings: the law's other settings (order, model_drum_run).
 
     Raises:
@@ -167,7 +168,7 @@ def map_gain_matrix(
     poses: Iterable[RigidTransform | ArrayLike],
     cable_model: str = "SCMWE",
     *,
-    tensions: str = "minimum norm",
+    tensions: str = DEFAULT_RULE,
     settings: ServoSettings | None = None,
 ) -> GainMap:
     """Return the gain matrices at many poses: which are slow, coupled, unstable.
@@ -177,7 +178,7 @@ def map_gain_matrix(
         believed: the robot as the controller knows it; the true one if None.
         poses: n of them, X_WP or [roll, pitch, yaw, x, y, z] (rad, m), as the controller sees them.
         cable_model: the law's "ECM", "CMWE", "SCMWE" or "SLSM".
-        tensions: "minimum norm", or "within limits".
+        tensions: one of `model.statics.RULES`.
         settings: the law's other settings.
 
     Raises:

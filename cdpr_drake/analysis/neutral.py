@@ -19,7 +19,7 @@ from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.rest_model import rest_model
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import vector_to_pose
-from cdpr_drake.model.statics import wrench_matrix
+from cdpr_drake.model.statics import DEFAULT_RULE, wrench_matrix
 from cdpr_drake.study.state_space import Array
 
 
@@ -39,7 +39,7 @@ class NeutralDirections:
 
 
 def neutral_directions(
-    robot: CableRobot, pose: RigidTransform | ArrayLike, tensions: str = "minimum norm"
+    robot: CableRobot, pose: RigidTransform | ArrayLike, tensions: str = DEFAULT_RULE
 ) -> NeutralDirections:
     """Return what visual servoing leaves neutral at a pose: internal tensions, by cable.
 
@@ -48,7 +48,7 @@ def neutral_directions(
     Args:
         robot: the robot.
         pose: X_WP, or [roll, pitch, yaw, x, y, z] (rad, m).
-        tensions: "minimum norm" (of the chord tensions), or "within limits".
+        tensions: one of `model.statics.RULES`.
 
     Raises:
         GeometryError, TensionError, EquilibriumError: the robot cannot rest there.

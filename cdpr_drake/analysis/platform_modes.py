@@ -9,6 +9,7 @@ from cdpr_drake.model.equilibrium import rest_state
 from cdpr_drake.model.rest_model import RestModel, rest_model
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.signals import POSE, TWIST
+from cdpr_drake.model.statics import DEFAULT_RULE
 from cdpr_drake.study.modes import Modes, modes_of
 
 
@@ -17,7 +18,7 @@ def platform_modes(
     pose: RigidTransform | ArrayLike,
     winches: str = "locked",
     *,
-    tensions: str = "minimum norm",
+    tensions: str = DEFAULT_RULE,
 ) -> Modes:
     """Return the modes of the platform on its cables at a rest.
 
@@ -29,7 +30,7 @@ def platform_modes(
         robot: the robot, with its payload.
         pose: X_WP, or [roll, pitch, yaw, x, y, z] (rad, m).
         winches: "locked", or "controlled" by their PID at constant desired angles.
-        tensions: "minimum norm" (of the chord tensions), or "within limits".
+        tensions: one of `model.statics.RULES`.
 
     Raises:
         GeometryError, TensionError, EquilibriumError: the robot cannot rest there.

@@ -26,6 +26,7 @@ from cdpr_drake.model.camera import true_from_seen
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.servo import ServoSettings
 from cdpr_drake.model.signals import ERROR, POSE, TWIST
+from cdpr_drake.model.statics import DEFAULT_RULE
 from cdpr_drake.study.modes import Mode, Modes, modes
 from cdpr_drake.study.sampled import OnePeriodMap, one_period_map
 from cdpr_drake.study.state_space import Array
@@ -55,7 +56,7 @@ class SampledServo:
         sample_time: T [s].
         believed: the robot as the controller knows it; the true one if None.
         cable_model: the law's "ECM", "CMWE", "SCMWE" or "SLSM".
-        tensions: "minimum norm" (of the chord tensions), or "within limits".
+        tensions: one of `model.statics.RULES`.
         settings: the law's other settings (order, model_drum_run).
         drag: [1/s], a wrench of -drag times the platform's momentum, for what damps it besides the
             stretch of the cables.
@@ -73,7 +74,7 @@ class SampledServo:
         *,
         believed: CableRobot | None = None,
         cable_model: str = "SCMWE",
-        tensions: str = "minimum norm",
+        tensions: str = DEFAULT_RULE,
         settings: ServoSettings | None = None,
         drag: float = 0.0,
     ) -> None:

@@ -14,6 +14,7 @@ from cdpr_drake.diagrams.sensing import sensing_called
 from cdpr_drake.model.calibration_errors import CalibrationErrors, misjudged
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.rotations import pose_to_vector
+from cdpr_drake.model.statics import MINIMUM_NORM
 from cdpr_drake.runs.moves import move_near_the_middle
 from cdpr_drake.runs.paper_tests import paper_test, paper_tests
 from cdpr_drake.runs.running import run
@@ -65,7 +66,11 @@ def base_case(
         found = paper_test(test)
         robot = found.carried_by(robot)
         start, goal = found.poses(robot)
-        case |= {"payload": robot.payload.mass, "until": found.duration}
+        case |= {
+            "payload": robot.payload.mass,
+            "until": found.duration,
+            "tensions": MINIMUM_NORM,
+        }
     case |= {"start": pose_to_vector(start).tolist(), "goal": pose_to_vector(goal).tolist()}
     case |= changes
     return case if "gain" in case else {**case, "gain": chosen_gain(case).gain}

@@ -131,16 +131,16 @@ def _taking(metavar: str, help: str | None = None, **settings: Any) -> dict[str,
     return {"metavar": metavar, **({"help": help} if help else {}), **settings}
 
 
-DEFAULT_RULE = "minimum norm"
 MODELS = "ECM, CMWE, SCMWE, SLSM"
 
 ROBOT = _taking("NAME|FILE", "a built-in robot, or a robot file (default: cogiro)")
 ROBOTS = _taking("NAME|FILE,...", type=parse_names, action="extend")
 PAYLOAD = _taking("KG", "mass carried (default: the test's; else the robot's)", type=float)
 POSE = _taking("X,Y,Z[,R,P,Y]", type=parse_pose)
-TENSIONS = _taking("RULE", "of those that balance the platform: minimum-norm, or within-limits of "
-                   "the robot (default: minimum-norm)",
-                   type=parse_rule, default=DEFAULT_RULE)  # fmt: skip
+TENSIONS = _taking("RULE", "of those that balance the platform: minimum-norm-within-limits; "
+                   "minimum-norm, whatever the limits; within-limits, closest to the preferred "
+                   "tension (default: the first, and for the paper's tests its own rule, the "
+                   "second)", type=parse_rule)  # fmt: skip
 CABLE_MODEL = _taking("MODEL", f"of the law: {MODELS} (default: SCMWE)",
                       type=parse_model, default="SCMWE")  # fmt: skip
 CABLE_MODELS = _taking("MODEL,...", type=parse_models, action="extend")
@@ -166,7 +166,7 @@ def add_place(
         robot: settings of --robot.
         default: the pose if nobody asks for one, in words.
     """
-    parser.set_defaults(tensions=DEFAULT_RULE)
+    parser.set_defaults(tensions=None)
     group = parser.add_argument_group("which robot, and where")
     group.add_argument("--robot", **robot)
     group.add_argument("--payload", **PAYLOAD)

@@ -16,6 +16,7 @@ from cdpr_drake.commands.resolve import (
     input_refused,
     pose_values,
     resolve_place,
+    resolve_rule,
 )
 from cdpr_drake.commands.terminal import Column, counted, fitting, table, width_of, wrapped
 
@@ -83,7 +84,7 @@ def _compare(options: Namespace) -> Comparison:
         raise ValueError("--test and --pose are for one robot, and robots differ in size")
     rows: list[ModelComparison] = []
     for name in counted(names, "robots"):
-        robot, pose, _, tensions = resolve_place(options, name, default_test=None)
+        robot, pose, _, tensions, _ = resolve_place(options, name, default_test=None)
         poses = {robot.name: pose}
         rows += compare_cable_models([robot], models, poses=poses, tensions=tensions).rows
     return Comparison(rows=tuple(rows))
@@ -94,7 +95,7 @@ def _lowest_gain(options: Namespace, comparison: Comparison) -> DefaultGain:
 
     from cdpr_drake.analysis import default_gain, lowest_gain
 
-    found, rule = [], options.tensions
+    found, rule = [], resolve_rule(options, options.test is not None)
     for row in comparison.rows:
         robot = row.gamma.rest.robot
         timing = robot.cameras.sample_time, robot.cameras.latency

@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cdpr_drake.commands import UsageError
-from cdpr_drake.commands.arguments import DEFAULT_RULE
 from cdpr_drake.commands.kernels import compilation_announced
 
 if TYPE_CHECKING:
@@ -30,17 +29,19 @@ class Place(NamedTuple):
         pose: X_WP.
         where: the pose in words.
         tensions: the rule for its tensions.
+        asked: whether somebody asked for that rule.
     """
 
     robot: CableRobot
     pose: RigidTransform
     where: str
     tensions: str
+    asked: bool
 
     def __str__(self) -> str:
         """Robot, mass and place as part of a sentence."""
         x, y, z = self.pose.translation()
-        rule = "" if self.tensions == DEFAULT_RULE else f", tensions {self.tensions}"
+        rule = f", tensions {self.tensions}" if self.asked else ""
         where = f"{self.where}, ({x:.2f}, {y:.2f}, {z:.2f}) m"
         return f"{self.robot.name}, {self.robot.mass:g} kg, {where}{rule}"
 
@@ -94,7 +95,9 @@ def resolve_place(
         pose, where = test.poses(found)[1], f"at the goal of Test {number}"
     if options.pose is not None:
         pose, where = as_pose(options.pose), "at the pose asked for"
-    return Place(found, pose, where, options.tensions)
+    return Place(
+        found, pose, where, resolve_rule(options, test is not None), options.tensions is not None
+    )
 
 
 def resolve_move(options: Namespace) -> Move:
@@ -108,7 +111,19 @@ def resolve_move(options: Namespace) -> Move:
     robot, number, test = _robot_and_test(options, options.robot, DEFAULT_TEST)
     start, goal = move_near_the_middle(robot) if test is None else test.poses(robot)
     ends = options.start or start, options.goal or goal
-    return Move(robot, *ends, number, test, options.tensions)
+    return Move(robot, *ends, number, test, resolve_rule(options, test is not None))
+
+
+def resolve_rule(options: Namespace, in_test: bool) -> str:
+    """Return the rule for tensions: that of `options`, the paper's in its tests, or the default.
+
+    Whether it is for a test of the paper, `in_test` says.
+    """
+    from cdpr_drake.model.statics import DEFAULT_RULE, MINIMUM_NORM
+
+    if options.tensions is not None:
+        return str(options.tensions)
+    return MINIMUM_NORM if in_test else DEFAULT_RULE
 
 
 def resolve_robot(name: str | None) -> CableRobot:

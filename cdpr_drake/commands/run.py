@@ -192,7 +192,7 @@ def plan(options: Namespace) -> Plan:
     # Runs that see, believe or pull otherwise do not replace the plain one's results.
     seen = "" if options.sensors == SENSORS[0] else f"-{options.sensors}"
     known = "" if options.calibrated is None else "-calibrated"
-    pulled = "" if options.tensions == common.DEFAULT_RULE else f"-{as_file_name(options.tensions)}"
+    pulled = "" if options.tensions is None else f"-{as_file_name(options.tensions)}"
     return Plan(f"{name}{seen}{known}{pulled}", setups, chosen)
 
 
@@ -274,6 +274,7 @@ def describe(name: str, setup: Setup, chosen: DefaultGain | None = None) -> str:
     """
     from cdpr_drake.diagrams import TargetSensing, VisionLoop
     from cdpr_drake.model.servo import pose_error
+    from cdpr_drake.model.statics import DEFAULT_RULE, MINIMUM_NORM
     from cdpr_drake.runs.moves import DECAYS, LONGEST
 
     s = pose_error(setup.start, setup.goal, setup.robot.cameras.X_PM)
@@ -288,7 +289,7 @@ def describe(name: str, setup: Setup, chosen: DefaultGain | None = None) -> str:
             loop = f"{1.0 / timing.sample_time:g} Hz with {1e3 * timing.latency:g} ms of latency, "
         if isinstance(sensing, TargetSensing):
             noise = f"sensors: {sensing.name} ({sensing.estimator} estimate), {noise}"
-    if setup.tensions != common.DEFAULT_RULE:
+    if setup.tensions not in (DEFAULT_RULE, MINIMUM_NORM):
         noise = f"tensions {setup.tensions}, {noise}"
     if setup.loop.believed is not None:
         noise = f"a calibrated robot believed, {noise}"

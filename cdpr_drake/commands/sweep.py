@@ -152,8 +152,9 @@ def _plan(options: Namespace) -> tuple[dict[str, Any], dict[str, Any], DefaultGa
         "cable_model": options.cable_model,
         "noise": not options.no_noise,
         "sensors": options.sensors,
-        "tensions": options.tensions,
     }
+    if options.tensions is not None:
+        changes["tensions"] = options.tensions
     if options.until is not None:
         changes["until"] = options.until
     spread: dict[str, Any] = {"calibration": options.calibration}

@@ -14,6 +14,7 @@ from cdpr_drake.diagrams.timing import Timing
 from cdpr_drake.diagrams.wiring import SystemOrMaker, add_plant, add_reference, check_robot, finish
 from cdpr_drake.model.cable_models import cable_model_name
 from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.statics import DEFAULT_RULE, check_rule
 from cdpr_drake.systems import InverseKinematicsAngles, PoseError
 from cdpr_drake.systems.fused_plant import fused_refusal
 
@@ -28,9 +29,10 @@ class JointSpaceLoop:
         gain: lambda [1/s] of the exponential approach of a run, as the ideal vision-based law would
             make it; the robot's own or 0.1 if None.
         ramp_time: over which that gain rises from zero at the start [s].
+        tensions: how the inverse kinematics chooses them, one of `model.statics.RULES`.
 
     Raises:
-        ValueError: an unknown cable model.
+        ValueError: an unknown cable model or rule.
     """
 
     controller: ClassVar[str] = "JSC"
@@ -40,8 +42,10 @@ class JointSpaceLoop:
     believed: CableRobot | None = None
     gain: float | None = None
     ramp_time: float = 1.0
+    tensions: str = DEFAULT_RULE
 
     def __post_init__(self) -> None:
+        check_rule(self.tensions)
         object.__setattr__(self, "cable_model", cable_model_name(self.cable_model))
 
     def replace(self, **fields: Any) -> JointSpaceLoop:
@@ -77,7 +81,8 @@ class JointSpaceLoop:
         plant = make_plant(robot, command="desired_motor_angles", load_cells=False, fast=fast)
         external_wrench = add_plant(builder, plant, robot, parts)
         inverse = builder.AddNamedSystem(
-            "inverse_kinematics", InverseKinematicsAngles(believed, self.cable_model)
+            "inverse_kinematics",
+            InverseKinematicsAngles(believed, self.cable_model, self.tensions),
         )
         error = builder.AddNamedSystem("true_error", PoseError(robot))
         builder.Connect(inverse.get_output_port(), plant.GetInputPort("desired_motor_angles"))
@@ -93,6 +98,7 @@ def make_joint_space_control(
     robot: CableRobot,
     *,
     cable_model: str = "SCMWE",
+    tensions: str = DEFAULT_RULE,
     believed: CableRobot | None = None,
     reference: SystemOrMaker | Trajectory | None = None,
     parts: tuple[SystemOrMaker, ...] = (),
@@ -118,6 +124,7 @@ def make_joint_space_control(
     Args:
         robot: the true robot.
         cable_model: of the inverse kinematics; the paper takes "SCMWE" (eq. 8).
+        tensions: how it chooses them, one of `model.statics.RULES`; the paper takes "minimum norm".
         believed: the robot as the controller believes it; the true one if None.
         reference: a system with an output desired_pose, what makes one for a robot, or a Drake
             trajectory of poses; if None, desired_pose is an input of the loop.
@@ -128,5 +135,5 @@ def make_joint_space_control(
         TypeError: the robot, reference or a part is none.
         ValueError: an unknown cable model; a slot without the ports it needs; what cannot be fast.
     """
-    loop = JointSpaceLoop(cable_model=cable_model, believed=believed)
+    loop = JointSpaceLoop(cable_model=cable_model, believed=believed, tensions=tensions)
     return loop.make(robot, reference=reference, parts=parts, fast=fast)

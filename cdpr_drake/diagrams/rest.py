@@ -20,6 +20,7 @@ from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.model.equilibrium import RestState, forward_kinematics, rest_state
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, as_pose, pose_to_vector
+from cdpr_drake.model.statics import DEFAULT_RULE
 
 TOLERANCE = 1e-9
 """Rate of change of a state at rest, relative to the largest term of its equation."""
@@ -28,7 +29,7 @@ TOLERANCE = 1e-9
 def rest_context(
     diagram: Diagram,
     pose: RigidTransform | ArrayLike,
-    tensions: str = "minimum norm",
+    tensions: str = DEFAULT_RULE,
     seed: int | None = None,
 ) -> Context:
     """Return a context in which plant, winches, filters, samples and latency buffers are at rest.
@@ -42,7 +43,7 @@ def rest_context(
         diagram: any diagram with a system that has cables (`CatenaryCableForce` or `FusedPlant`),
             whatever its blocks are called.
         pose: X_WP, or [roll, pitch, yaw, x, y, z] (rad, m).
-        tensions: "minimum norm" (of the chord tensions), or "within limits"; without effect in a
+        tensions: one of `model.statics.RULES`; without effect in a
             joint space loop.
         seed: of the diagram's noise sources, each with a generator of its own by the seed and the
             name of the source; None leaves them to Drake, whose seeds differ from one context to

@@ -15,7 +15,7 @@ from cdpr_drake.model.inverse_kinematics import motor_angles
 from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, as_pose, exp_rotation
-from cdpr_drake.model.statics import check_rank, distribute, wrench_at, wrench_matrix
+from cdpr_drake.model.statics import DEFAULT_RULE, check_rank, distribute, wrench_at, wrench_matrix
 from cdpr_drake.model.winch import WinchModel
 
 TOLERANCE = 1e-11
@@ -50,7 +50,7 @@ class RestState:
 def rest_state(
     robot: CableRobot,
     pose: RigidTransform | ArrayLike,
-    rule: str = "minimum norm",
+    rule: str = DEFAULT_RULE,
     wrench: ArrayLike | None = None,
 ) -> RestState:
     """Return the robot at rest at a pose, its chord tensions chosen by a rule.
@@ -61,8 +61,7 @@ def rest_state(
     Args:
         robot: the robot.
         pose: X_WP, or [roll, pitch, yaw, x, y, z] (rad, m).
-        rule: "minimum norm", or "within limits": inside the robot's tension limits and closest to
-            their middle.
+        rule: one of `model.statics.RULES`.
         wrench: (6,) [torque; force] on the platform at its origin in W, besides weight and cables;
             none if None.
 

@@ -8,32 +8,56 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import GeometryError, TensionError
 from cdpr_drake.model.arrays import RobotArrays
-from cdpr_drake.model.cable_models import cable_model_index, cable_model_name
+from cdpr_drake.model.cable_models import cable_model_index, cable_model_name, unstrained_length
+from cdpr_drake.model.distribution import minimum_norm_within
 from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, as_pose, pose_to_vector
-from cdpr_drake.model.statics import weight_wrench, what_limits_allow, wrench_matrix
+from cdpr_drake.model.statics import (
+    CLOSEST,
+    DEFAULT_RULE,
+    D_theta,
+    check_rule,
+    distribute,
+    tension_distribution,
+    weight_wrench,
+    what_limits_allow,
+    wrench_matrix,
+)
+
+STEP = 1e-6
+"""Of the differences that make a Jacobian where a tension is at its limit [m, rad]."""
 
 
 class InverseKinematics:
     """Unstrained lengths of a robot's cables at any pose, by one of the paper's cable models.
 
-    The horizontal tensions are those of least norm that balance the robot's nominal mass (A.2).
-    Lengths include the run from drum to eyelet, unstretched: l = l_model(pose) + run.
+    The horizontal tensions are those of least norm that balance the robot's nominal mass (A.2),
+    within the robot's limits of the tension or whatever they are. Lengths include the run from drum
+    to eyelet, unstretched: l = l_model(pose) + run.
 
     Args:
         robot: the robot as the controller knows it.
         cable_model: "ECM", "CMWE", "SCMWE" (eq. 8, the paper's choice) or "SLSM".
         order: order of the series of the ECM.
+        rule: how tensions are chosen, one of `model.statics.RULES`; the paper has "minimum norm".
 
     Raises:
-        ValueError: an unknown cable model.
+        ValueError: an unknown cable model or rule.
     """
 
-    def __init__(self, robot: CableRobot, cable_model: str = "SCMWE", order: int = 4) -> None:
+    def __init__(
+        self,
+        robot: CableRobot,
+        cable_model: str = "SCMWE",
+        order: int = 4,
+        rule: str = DEFAULT_RULE,
+    ) -> None:
         from cdpr_drake.model.kernels import inverse as kernel
 
-        self.robot, self._kernel = robot, kernel
+        check_rule(rule)
+        self.robot, self.cable_model, self.order, self.rule = robot, cable_model, order, rule
+        self._kernel = kernel
         self._head = (cable_model_index(cable_model_name(cable_model)), order)
         arrays = RobotArrays(robot)
         self._robot_arrays = (arrays.points, arrays.body, arrays.stiffness)
@@ -60,24 +84,58 @@ class InverseKinematics:
         """
         k = self.robot.num_cables
         out, H, jacobian = np.zeros(k), np.zeros(k), np.zeros((k, 6))
+        if self.rule != CLOSEST:
+            if with_jacobian:
+                status = self._kernel.unstrained_lengths_jacobian(
+                    *self._head, pose, *self._robot_arrays, out, H, jacobian
+                )
+            else:
+                arrays = self._robot_arrays
+                status = self._kernel.unstrained_lengths(*self._head, pose, *arrays, out, H)
+            if status < 0:
+                raise GeometryError("the wrench matrix has rank below 6 at the desired pose")
+            if self._heeds_limits(pose, H, status):
+                return out + self.robot.cable.drum_run, jacobian
         if with_jacobian:
-            status = self._kernel.unstrained_lengths_jacobian(
-                *self._head, pose, *self._robot_arrays, out, H, jacobian
-            )
+            steps = STEP * np.eye(6)
+            ends = [[self._bounded(pose + sign * step) for sign in (1.0, -1.0)] for step in steps]
+            jacobian = np.array([(ahead - behind) / (2.0 * STEP) for ahead, behind in ends]).T
+        return self._bounded(pose) + self.robot.cable.drum_run, jacobian
+
+    def _heeds_limits(self, pose: Array, H: Array, status: int) -> bool:
+        """Return whether tensions of least norm whatever the limits are what the rule asks for."""
+        geometry = cable_geometry(self.robot, pose)
+        if self.rule == DEFAULT_RULE:
+            low, high = self.robot.cable.limits
+            T = H * geometry.L / geometry.Bx
+            return bool(status == 0 and np.all(low <= T) and np.all(high >= T))
+        if status == 0:
+            return True
+        wrench = weight_wrench(self.robot, geometry)
+        allowed = what_limits_allow(self.robot, wrench_matrix(geometry), wrench)
+        raise TensionError(
+            f"at the desired pose {np.array2string(pose, precision=3)} the tensions of least "
+            f"norm would need cable {status} to push; {allowed}"
+        )
+
+    def _bounded(self, pose: Array) -> Array:
+        """Return the spans' unstrained lengths (k,) [m] with tensions within the limits."""
+        robot, geometry = self.robot, cable_geometry(self.robot, pose)
+        slope = geometry.L / geometry.Bx
+        if self.rule == CLOSEST:
+            H = tension_distribution(robot, pose, self.rule) / slope
         else:
-            status = self._kernel.unstrained_lengths(*self._head, pose, *self._robot_arrays, out, H)
-        if status < 0:
-            raise GeometryError("the wrench matrix has rank below 6 at the desired pose")
-        if status > 0:
-            geometry = cable_geometry(self.robot, pose)
-            wrench = weight_wrench(self.robot, geometry)
-            allowed = what_limits_allow(self.robot, wrench_matrix(geometry), wrench)
-            raise TensionError(
-                f"at the desired pose {np.array2string(pose, precision=3)} the tensions of least "
-                f"norm would need cable {status} to push, and joint space control takes no others; "
-                f"{allowed}"
-            )
-        return out + self.robot.cable.drum_run, jacobian
+            low, high = (limit / slope for limit in robot.cable.limits)
+            wrench = weight_wrench(robot, geometry)
+            try:
+                H = minimum_norm_within(D_theta(geometry), wrench, low, high)
+            except TensionError:
+                distribute(robot, wrench_matrix(geometry), wrench, self.rule, as_pose(pose))
+                raise  # at the very edge of the limits
+        T = H * slope
+        EA = np.array([robot.cable.stiffness(t) for t in T])
+        w = robot.weight_per_metre
+        return unstrained_length(self.cable_model, geometry.Bx, geometry.Bz, H, w, EA, self.order)
 
     def motor_angles(self, pose: RigidTransform | ArrayLike) -> Array:
         """Return the motor angles (k,) [rad] at a `pose`, X_WP or [rpy, xyz].

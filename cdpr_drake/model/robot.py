@@ -101,6 +101,10 @@ class Cable(Record):
         min_tension: [N], the lowest a tension distribution may ask for.
         max_tension: [N], the highest a tension distribution may ask for.
         breaking_load: [N].
+        tension_margin: [N], by which a distribution within the limits stays off both of them; 0 if
+            None.
+        preferred_tension: [N], to which the rule "within limits" stays close; the middle of the
+            limits if None.
     """
 
     linear_density: float
@@ -112,6 +116,14 @@ class Cable(Record):
     min_tension: float
     max_tension: float
     breaking_load: float
+    tension_margin: float | None = None
+    preferred_tension: float | None = None
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """The lowest and highest tension [N] that a distribution within the limits asks for."""
+        margin = self.tension_margin or 0.0
+        return self.min_tension + margin, self.max_tension - margin
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -199,6 +199,13 @@ def _cable(robot: CableRobot) -> Problems:
     if cable.min_tension >= cable.max_tension:
         limits = f"{cable.max_tension:g} N, got {cable.min_tension:g} N"
         yield "cable.min_tension", f"must be below max_tension, {limits}"
+    low, high = cable.limits
+    if cable.tension_margin is not None and not (cable.tension_margin >= 0.0 and low < high):
+        text = "must not be negative, and leave something between the limits"
+        yield "cable.tension_margin", f"{text}, got {cable.tension_margin:g} N"
+    preferred = cable.preferred_tension
+    if preferred is not None and not cable.min_tension <= preferred <= cable.max_tension:
+        yield "cable.preferred_tension", f"must be within the limits, got {preferred:g} N"
     if cable.max_tension > cable.breaking_load:
         limits = f"{cable.breaking_load:g} N, got {cable.max_tension:g} N"
         yield "cable.max_tension", f"must not exceed breaking_load, {limits}"

@@ -23,6 +23,14 @@ from cdpr_drake.model.kinematics import D_B, CableGeometry, D_Bf, D_u, cable_geo
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, as_pose, numbers, skew
 
+MINIMUM_NORM = "minimum norm"
+DEFAULT_RULE = "minimum norm within limits"
+CLOSEST = "within limits"
+RULES = (DEFAULT_RULE, MINIMUM_NORM, CLOSEST)
+"""How tensions are chosen among those that balance the platform: of least norm within the robot's
+limits, which is continuous in the pose; of least norm whatever the limits, the paper's rule; within
+the limits and closest to the preferred tension, or else to their middle."""
+
 
 def wrench_at(arm: Array, force: Array) -> Array:
     """Return (..., 6): the wrench [arm x force; force] at the platform's origin of a force.
@@ -171,19 +179,18 @@ def minimum_norm_horizontal_tensions(robot: CableRobot, pose: RigidTransform | A
     geometry = cable_geometry(robot, X_WP)
     matrix = D_theta(geometry)
     check_rank(matrix)
-    return distribute(robot, matrix, weight_wrench(robot, geometry), "minimum norm", X_WP)
+    return distribute(robot, matrix, weight_wrench(robot, geometry), MINIMUM_NORM, X_WP)
 
 
 def tension_distribution(
-    robot: CableRobot, pose: RigidTransform | ArrayLike, rule: str = "minimum norm"
+    robot: CableRobot, pose: RigidTransform | ArrayLike, rule: str = DEFAULT_RULE
 ) -> Array:
     """Return chord tensions T (k,) [N] that balance the weight at a pose in the simplified model.
 
     Args:
         robot: the robot.
         pose: X_WP, or [roll, pitch, yaw, x, y, z] (rad, m).
-        rule: "minimum norm", or "within limits": inside the robot's tension limits and closest to
-            their middle.
+        rule: one of `RULES`.
 
     Raises:
         GeometryError: the wrench matrix has rank below 6.
@@ -199,36 +206,49 @@ def tension_distribution(
 def distribute(
     robot: CableRobot, matrix: Array, wrench: Array, rule: str, X_WP: RigidTransform
 ) -> Array:
-    """Return tensions (k,) [N] with matrix t = wrench, by a rule of `tension_distribution`.
+    """Return tensions (k,) [N] with matrix t = wrench, by a rule.
 
     Args:
         robot: the robot, for its limits.
         matrix: (6, k) wrench per unit of tension.
         wrench: (6,) to balance.
-        rule: "minimum norm" or "within limits".
+        rule: one of `RULES`.
         X_WP: the pose, for the message of an error.
 
     Raises:
-        TensionError: no such tensions.
+        TensionError: no such tensions; says which rule failed, and what a linear programme knows.
         ValueError: an unknown rule.
     """
-    if rule == "minimum norm":
-        tensions = np.asarray(np.linalg.lstsq(matrix, wrench, rcond=None)[0], float)
-        worst = int(np.argmin(tensions))
-        if tensions[worst] <= 0.0:
+    check_rule(rule)
+    low, high = robot.cable.limits
+    least = np.asarray(np.linalg.lstsq(matrix, wrench, rcond=None)[0], float)
+    if rule == MINIMUM_NORM:
+        worst = int(np.argmin(least))
+        if least[worst] <= 0.0:
             raise TensionError(
                 f"minimum-norm tensions at {_describe(X_WP)} would need cable {worst + 1} to push "
-                f"({tensions[worst]:.1f} N): {what_limits_allow(robot, matrix, wrench)}"
+                f"({least[worst]:.1f} N): {what_limits_allow(robot, matrix, wrench)}"
             )
-        return tensions
-    if rule != "within limits":
-        raise ValueError(f'unknown rule "{rule}"; known are "minimum norm" and "within limits"')
-    low, high = robot.cable.min_tension, robot.cable.max_tension
+        return least
+    if rule == DEFAULT_RULE and np.all(least >= low) and np.all(least <= high):
+        return least
+    preferred = 0.0 if rule == DEFAULT_RULE else robot.cable.preferred_tension
     try:
-        return bounded_distribution(matrix, wrench, low, high, 0.5 * (low + high))
-    except TensionError as error:
-        allowed = what_limits_allow(robot, matrix, wrench)
-        raise TensionError(f"at {_describe(X_WP)}: {error}; {allowed}") from None
+        return bounded_distribution(
+            matrix, wrench, low, high, 0.5 * (low + high) if preferred is None else preferred
+        )
+    except TensionError:
+        worst = int(np.argmax(np.maximum(low - least, least - high)))
+        raise TensionError(
+            f"at {_describe(X_WP)}: {what_limits_allow(robot, matrix, wrench)}; at least norm, "
+            f"whatever the limits, cable {worst + 1} would bear {least[worst]:.1f} N"
+        ) from None
+
+
+def check_rule(rule: str) -> None:
+    """Raise ValueError unless a `rule` is one of `RULES`."""
+    if rule not in RULES:
+        raise ValueError(f'unknown rule "{rule}"; known are {", ".join(RULES)}')
 
 
 def what_limits_allow(robot: CableRobot, matrix: Array, wrench: Array) -> str:
@@ -241,13 +261,12 @@ def what_limits_allow(robot: CableRobot, matrix: Array, wrench: Array) -> str:
         matrix: (6, k) wrench per unit of tension.
         wrench: (6,) to balance.
     """
-    low, high = robot.cable.min_tension, robot.cable.max_tension
+    low, high = robot.cable.limits
     margin = feasibility_margin(matrix, wrench, low, high).margin
     limits = f"the limits of {low:g} to {high:g} N"
     if margin >= 0.0:
-        return (
-            f'tensions {margin:.3g} N inside {limits} hold it: the rule "within limits" finds some'
-        )
+        inside = f"tensions {margin:.3g} N inside {limits} hold it"
+        return f'{inside}: the rule "{DEFAULT_RULE}" finds some'
     if margin == -np.inf:
         return "no tensions at all hold the weight there"
     return (

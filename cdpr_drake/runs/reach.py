@@ -51,7 +51,7 @@ def check_pose(robot: CableRobot, X_WP: RigidTransform, name: str) -> None:
 
 
 def check_inverse_kinematics(
-    robot: CableRobot, poses: np.ndarray, times: np.ndarray, cable_model: str
+    robot: CableRobot, poses: np.ndarray, times: np.ndarray, cable_model: str, rule: str
 ) -> None:
     """Raise an error unless joint space control has motor angles all the way.
 
@@ -60,11 +60,12 @@ def check_inverse_kinematics(
         poses: (n, 6) desired poses [roll, pitch, yaw, x, y, z] (rad, m).
         times: (n,) when they are desired [s].
         cable_model: of the inverse kinematics.
+        rule: how it chooses tensions.
 
     Raises:
         GeometryError, TensionError: at one of the poses it has none; names the time.
     """
-    inverse = InverseKinematics(robot, cable_model)
+    inverse = InverseKinematics(robot, cable_model, rule=rule)
     for time, pose in zip(times, poses, strict=True):
         try:
             inverse.lengths(pose)

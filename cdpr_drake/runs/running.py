@@ -178,6 +178,7 @@ def _make_loop(setup: Setup) -> Diagram:
         setup.robot, setup.start, setup.goal, setup.gain, loop.ramp_time
     )
     _check_path(setup, loop, reference)
+    loop = loop.replace(tensions=setup.tensions)
     return loop.make(setup.robot, reference=reference, parts=setup.parts, fast=None)
 
 
@@ -203,7 +204,7 @@ def _check_path(setup: Setup, loop: JointSpaceLoop, reference: ExponentialApproa
         context.SetTime(time)
         poses.append(port.Eval(context))
     believed = loop.believed if loop.believed is not None else setup.robot
-    check_inverse_kinematics(believed, np.array(poses), times, loop.cable_model)
+    check_inverse_kinematics(believed, np.array(poses), times, loop.cable_model, setup.tensions)
 
 
 def _with_error_to(setup: Setup, record: Record) -> Record:

@@ -16,6 +16,7 @@ from cdpr_drake.diagrams.wiring import SystemOrMaker
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.rotations import as_pose
 from cdpr_drake.model.servo import CUSTOMARY_GAIN, ServoSettings
+from cdpr_drake.model.statics import DEFAULT_RULE, MINIMUM_NORM
 from cdpr_drake.runs.paper_tests import paper_test, paper_tests
 
 RECORD_PERIOD = 0.05
@@ -38,7 +39,8 @@ class Setup:
         seed: of the noise.
         until: how long to run [s].
         max_step: step of the integrator [s].
-        tensions: those of vision-based control at the start, "minimum norm" or "within limits".
+        tensions: those of vision-based control at the start, those of joint space control's inverse
+            kinematics all the way: one of `model.statics.RULES`.
         parts: what else pulls at the platform, see `make_vision_based_control`.
 
     Attributes:
@@ -56,7 +58,7 @@ class Setup:
     seed: int = 0
     until: float = 80.0
     max_step: float = MAX_STEP
-    tensions: str = "minimum norm"
+    tensions: str = DEFAULT_RULE
     parts: tuple[SystemOrMaker, ...] = ()
     chosen: DefaultGain | None = dataclasses.field(default=None, init=False)
 
@@ -182,6 +184,7 @@ def setup_of_test(number: int, robot: CableRobot | None = None, **changes: Any) 
         "start": start,
         "goal": goal,
         "until": test.duration,
+        "tensions": MINIMUM_NORM,  # the paper's own rule
     }
     loop = changes.get("loop", VisionLoop())
     if isinstance(loop, VisionLoop):

@@ -14,11 +14,12 @@ from cdpr_drake.diagrams.blocks import Block, blocks, continuous_state_names, di
 from cdpr_drake.diagrams.rest import TOLERANCE, cables_of, fix_inputs, rest_context, robot_of
 from cdpr_drake.errors import EquilibriumError, GeometryError, TensionError
 from cdpr_drake.model.rotations import as_pose, pose_to_vector
+from cdpr_drake.model.statics import DEFAULT_RULE
 from cdpr_drake.study.state_space import Array
 
 
 def equilibrium(
-    loop: Diagram, pose: RigidTransform | ArrayLike, tensions: str = "minimum norm"
+    loop: Diagram, pose: RigidTransform | ArrayLike, tensions: str = DEFAULT_RULE
 ) -> Context:
     """Return the context in which a whole loop is at rest with the desired pose set to `pose`.
 
@@ -31,7 +32,7 @@ def equilibrium(
         loop: any diagram with cables; its desired pose is an input that feeds ports
             "desired_pose", or none. Nothing has to be exported.
         pose: desired X_WP, or [roll, pitch, yaw, x, y, z] (rad, m).
-        tensions: "minimum norm" (of the chord tensions), or "within limits"; without effect under
+        tensions: one of `model.statics.RULES`; without effect under
             joint space control, where the winches' angles decide.
 
     Raises:

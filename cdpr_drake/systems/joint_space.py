@@ -12,6 +12,7 @@ from cdpr_drake.model.inverse_kinematics import InverseKinematics
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, exp_rotation, pose_to_vector
 from cdpr_drake.model.servo import pose_error, servo_twist
+from cdpr_drake.model.statics import DEFAULT_RULE
 from cdpr_drake.systems._template import chain, check_finite, scalar_convertible, seconds, value
 
 
@@ -28,22 +29,27 @@ class InverseKinematicsAngles(LeafSystem):
         - motor_angles
 
     q = (l_model(pose) + run - l(0)) / r, with horizontal tensions of least norm for the nominal
-    mass (A.2). All models but the ECM know no stretch: that is joint space control's error.
+    mass (A.2), within the robot's limits unless the rule says otherwise. All models but the ECM
+    know no stretch: that is joint space control's error.
 
     desired_pose (6) is [roll, pitch, yaw, x, y, z] (rad, m) of X_WP; motor_angles (k) in rad.
 
     Args:
         robot: the robot as the controller believes it.
         cable_model: "ECM", "CMWE", "SCMWE" or "SLSM".
+        rule: how tensions are chosen, one of `model.statics.RULES`.
 
     Raises:
         GeometryError, TensionError: at evaluation, where no cable tensions hold the platform.
     """
 
-    def __init__(self, robot: CableRobot, cable_model: str = "SCMWE") -> None:
+    def __init__(
+        self, robot: CableRobot, cable_model: str = "SCMWE", rule: str = DEFAULT_RULE
+    ) -> None:
         super().__init__()
         self.robot, self.cable_model = robot, cable_model_name(cable_model)
-        self._inverse = InverseKinematics(robot, cable_model)
+        self.rule = rule
+        self._inverse = InverseKinematics(robot, cable_model, rule=rule)
         winch = robot.winch
         self._zero, self._transmission = winch.encoder_zero_length, winch.transmission
         self._pose_port = self.DeclareVectorInputPort("desired_pose", 6)

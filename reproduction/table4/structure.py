@@ -20,6 +20,7 @@ from cdpr_drake.model.inverse_kinematics import InverseKinematics
 from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.robot import AxialStiffness
 from cdpr_drake.model.rotations import Array
+from cdpr_drake.model.statics import MINIMUM_NORM
 from cdpr_drake.runs import Setup, setup_of_test
 from cdpr_drake.systems import ExponentialApproach
 
@@ -83,7 +84,7 @@ def joint_space_rest(
     """
     robot = structure.robot(believed)
     cable = robot.cable
-    asked = InverseKinematics(believed).lengths(goal) - believed.cable.drum_run
+    asked = InverseKinematics(believed, rule=MINIMUM_NORM).lengths(goal) - believed.cable.drum_run
     length = asked + cable.drum_run + structure.zero_offset
     if structure.friction:
         # A run that bears c T stretches, to first order in T / EA, like one c times as long.
@@ -120,7 +121,7 @@ def last_direction(setup: Setup) -> Array:
     path = ExponentialApproach(setup.robot, setup.start, setup.goal, setup.gain, 0.0)
     context = path.CreateDefaultContext()
     context.SetTime(-np.log(LAST_PART) / setup.gain)
-    inverse = InverseKinematics(setup.robot)
+    inverse = InverseKinematics(setup.robot, rule=MINIMUM_NORM)
     before = inverse.lengths(path.GetOutputPort("desired_pose").Eval(context))
     return np.sign(inverse.lengths(setup.goal) - before)
 
