@@ -64,6 +64,9 @@ def rest_context(
     wrench, scale = np.zeros(6), robot.mass * robot.gravity
     step, before = np.zeros(6), np.zeros(6)
     inverse = np.eye(6)  # of -d unbalanced / d wrench, which is 1 where the pose stays
+    # Where the pose is not held, a long step may go beyond what the cables bear there.
+    gives_way = any(block.answer("motor_angles_at") is not None for block in inside)
+    reach = 0.3 * scale if gives_way else np.inf
     for _ in range(50):
         _place(diagram, inside, context, rest)
         unbalanced = _unbalanced(inside, context)
@@ -73,6 +76,7 @@ def rest_context(
         if step @ seen:  # Broyden's update; without it, springs stiffer than the cables diverge
             inverse += np.outer(step - seen, step @ inverse) / (step @ seen)
         before, step = unbalanced, inverse @ unbalanced
+        step *= min(1.0, reach / np.max(np.abs(step)))
         wrench = wrench + step
         rest = _rest_of_weight(inside, robot, X_WP, tensions, wrench)
     else:

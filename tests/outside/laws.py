@@ -73,9 +73,7 @@ class PlainLqr(LeafSystem):
     ) -> None:
         super().__init__()
         self.S = settled_pose_per_angle(robot, goal, tensions)
-        self.gain, _ = LinearQuadraticRegulator(
-            np.zeros((6, 6)), self.S, *weights(self.S, rate)
-        )
+        self.gain, _ = LinearQuadraticRegulator(np.zeros((6, 6)), self.S, *weights(self.S, rate))
         self._pose = self.DeclareVectorInputPort("measured_pose", 6)
         self._desired = self.DeclareVectorInputPort("desired_pose", 6)
         self.DeclareVectorOutputPort("motor_rates", robot.num_cables, self._calc)
@@ -189,9 +187,7 @@ class Predicting(LeafSystem):
     ) -> None:
         super().__init__()
         self._S = settled_pose_per_angle(robot, goal, tensions)
-        self.gain, _ = LinearQuadraticRegulator(
-            np.zeros((6, 6)), self._S, *weights(self._S, rate)
-        )
+        self.gain, _ = LinearQuadraticRegulator(np.zeros((6, 6)), self._S, *weights(self._S, rate))
         self._pose = self.DeclareVectorInputPort("measured_pose", 6)
         self._desired = self.DeclareVectorInputPort("desired_pose", 6)
         self._age = self.DeclareVectorInputPort("age", 1)

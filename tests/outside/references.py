@@ -27,9 +27,7 @@ class Circle(LeafSystem):
         self._omega = 2.0 * np.pi / period
         self.DeclareVectorOutputPort("desired_pose", 6, self._calc_pose, {self.time_ticket()})
         if tells_twist:
-            self.DeclareVectorOutputPort(
-                "desired_twist", 6, self._calc_twist, {self.time_ticket()}
-            )
+            self.DeclareVectorOutputPort("desired_twist", 6, self._calc_twist, {self.time_ticket()})
 
     def at(self, time: float) -> np.ndarray:
         """Return the pose at a `time` [s]."""
