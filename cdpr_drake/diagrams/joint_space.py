@@ -75,6 +75,7 @@ class JointSpaceLoop:
         """
         check_robot(robot)
         believed = self.believed if self.believed is not None else robot
+        check_robot(believed, "the robot is believed to be")
         builder = DiagramBuilder()
         if fast is None:
             fast = not fused_refusal(robot, load_cells=False)

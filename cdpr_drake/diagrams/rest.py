@@ -63,12 +63,22 @@ def rest_context(
     fix_inputs(diagram, context, {"desired_pose"}, pose_to_vector(X_WP))
     rest = _rest_of_weight(inside, robot, X_WP, tensions, None)
     wrench, scale = np.zeros(6), robot.mass * robot.gravity
+    step, before = np.zeros(6), np.zeros(6)
+    inverse = np.eye(6)  # of -d unbalanced / d wrench, which is 1 where the pose stays
+    # Where the pose is not held, a long step may go beyond what the cables bear there.
+    gives_way = any(block.answer("motor_angles_at") is not None for block in inside)
+    reach = 0.3 * scale if gives_way else np.inf
     for _ in range(50):
         _place(diagram, inside, context, rest)
         unbalanced = _unbalanced(inside, context)
         if np.max(np.abs(unbalanced)) <= TOLERANCE * max(scale, np.max(np.abs(wrench))):
             break
-        wrench = wrench + unbalanced
+        seen = inverse @ (before - unbalanced)
+        if step @ seen:  # Broyden's update; without it, springs stiffer than the cables diverge
+            inverse += np.outer(step - seen, step @ inverse) / (step @ seen)
+        before, step = unbalanced, inverse @ unbalanced
+        step *= min(1.0, reach / np.max(np.abs(step)))
+        wrench = wrench + step
         rest = _rest_of_weight(inside, robot, X_WP, tensions, wrench)
     else:
         raise EquilibriumError(
@@ -95,6 +105,19 @@ def set_at_rest(diagram: Diagram, context: Context, rest: RestState) -> None:
     inside = list(blocks(diagram))
     _place(diagram, inside, context, rest)
     _settle(inside, context)
+
+
+def settle(diagram: Diagram, context: Context) -> None:
+    """Have samples and memories take what their inputs are now, after an input or the time changed.
+
+    Args:
+        diagram: any diagram.
+        context: its context, changed.
+
+    Raises:
+        EquilibriumError: samples and memories do not come to rest.
+    """
+    _settle(list(blocks(diagram)), context)
 
 
 def robot_of(diagram: Diagram) -> CableRobot:

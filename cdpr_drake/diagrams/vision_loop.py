@@ -16,9 +16,11 @@ from cdpr_drake.diagrams.timing import Timing
 from cdpr_drake.diagrams.wiring import (
     SystemOrMaker,
     add_noise,
+    add_once,
     add_plant,
     add_reference,
     check_robot,
+    class_of,
     export,
     finish,
     made,
@@ -146,6 +148,7 @@ class VisionLoop:
         """
         check_robot(robot)
         believed = self.believed if self.believed is not None else robot
+        check_robot(believed, "the robot is believed to be")
         if believed.num_cables != robot.num_cables:
             raise ValueError(
                 f"{believed.num_cables} cables in the robot as it is believed, "
@@ -162,7 +165,7 @@ class VisionLoop:
         )
         external_wrench = add_plant(builder, plant, robot, parts)
         found = self._sensed(builder, plant, robot, believed)
-        builder.AddNamedSystem("servo", law)
+        add_once(builder, "servo", law, "control law")
         error = builder.AddNamedSystem("true_error", PoseError(robot))
         builder.Connect(plant.GetOutputPort("pose"), error.GetInputPort("pose"))
         rates = self.timing.held_rates(builder, law.GetOutputPort("motor_rates"))
@@ -195,7 +198,7 @@ class VisionLoop:
             return PositionBasedVisualServo(believed, settings)
         law = made(self.law, believed, "control law")
         if not law.HasOutputPort("motor_rates"):
-            raise ValueError(f'the control law {law!r} has no output "motor_rates"')
+            raise ValueError(f'the control law, {class_of(law)}, has no output "motor_rates"')
         return law
 
     def _sensed(
@@ -203,7 +206,12 @@ class VisionLoop:
     ) -> Measurements:
         """Add the sensors and return what they give."""
         seen = PlantToMeasure(system=plant, robot=robot, believed=believed, timing=self.timing)
-        found = self.sensing.add_to(builder, seen)
+        add_to = getattr(self.sensing, "add_to", None)
+        if add_to is None or isinstance(self.sensing, type):
+            raise TypeError(f"sensing is a value with a method add_to, got {self.sensing!r}")
+        found = add_to(builder, seen)
+        if not isinstance(found, Measurements):
+            raise TypeError(f"add_to of {self.sensing!r} has to return Measurements, got {found!r}")
         if "pose" not in found.ports:
             given = ", ".join(found.ports) or "nothing"
             raise ValueError(f'sensing has to give a "pose", and gives {given}')
@@ -332,9 +340,10 @@ def make_vision_based_control(
         GeometryError: the cables cannot control all six degrees of freedom.
         RenderingError: with images, Drake cannot render on this machine.
         RobotFileError: with targets or images, the robot lacks the cameras or patterns they need.
-        TypeError: the robot, law, reference or a part is none.
+        TypeError: the robot, law, sensing, reference or a part is none.
         ValueError: a gain, period or latency out of range; gain * sample_time >= 1; what is said
-            both in a law and beside it; a slot without the ports it needs; what cannot be fast.
+            both in a law and beside it; a slot without the ports it needs, or with a system that is
+            in a diagram already; what cannot be fast.
     """
     given = {"cable_model": cable_model, "gain": gain, **servo}
     given = {name: value for name, value in given.items() if value is not None}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TypeAlias
 
 from pydrake.common import RandomDistribution
@@ -28,19 +28,53 @@ def made(slot: SystemOrMaker, robot: CableRobot, what: str) -> System:
 
     Raises:
         TypeError: it is neither.
+        ValueError: the system is part of a diagram already.
     """
     system = slot if isinstance(slot, System) or not callable(slot) else slot(robot)
     if not isinstance(system, System):
-        raise TypeError(f"a {what} is a Drake system, or makes one for a robot; got {slot!r}")
+        made_by = f" from {slot!r}" if system is not slot else ""
+        raise TypeError(
+            f"a {what} is a Drake system, or makes one for a robot; got {system!r}{made_by}"
+        )
+    path = system.GetSystemPathname().removeprefix("::")
+    if "::" in path:
+        raise ValueError(f'the {what} is in a diagram already, as "{path}"; {_ONE_EACH}')
     return system
 
 
-def check_robot(robot: object) -> None:
-    """Raise TypeError, with what is wanted, unless something is a `robot`."""
+_ONE_EACH = "a system fits in one place: give what makes one, lambda robot: ..."
+
+
+def add_once(builder: DiagramBuilder, name: str, system: System, what: str) -> System:
+    """Add a user's system to a loop and return it.
+
+    Args:
+        builder: of the loop.
+        name: of the block.
+        system: as `made` returns it.
+        what: it is, for the message.
+
+    Raises:
+        ValueError: it is in the loop already, at which Drake would end the process.
+    """
+    if any(other is system for other in builder.GetSystems()):
+        raise ValueError(
+            f'the {what} is in the loop already, as "{system.get_name()}"; {_ONE_EACH}'
+        )
+    return builder.AddNamedSystem(name, system)
+
+
+def class_of(system: System) -> str:
+    """Return what messages call a user's `system`: its class, not its address."""
+    return type(system).__name__
+
+
+def check_robot(robot: object, what: str = "a loop is made for") -> None:
+    """Raise TypeError, with what is wanted, unless something is a `robot`; `what` begins it."""
     if isinstance(robot, CableRobot):
         return
     hint = f'; load_robot("{robot}") makes one' if isinstance(robot, str) else ""
-    raise TypeError(f"a loop is made for a CableRobot, got {robot!r}{hint}")
+    raise TypeError(f"{what} a CableRobot, got {robot!r}{hint}")
 
 
 def add_plant(
@@ -56,8 +90,12 @@ def add_plant(
             W, and inputs called as outputs of the plant.
 
     Raises:
-        ValueError: a part lacks the output, or has an input that the plant does not have.
+        TypeError: a part is none, or not in a tuple.
+        ValueError: a part lacks the output, has an input that the plant does not have, or is in a
+            diagram already.
     """
+    if not isinstance(parts, Sequence):
+        raise TypeError(f"parts of the plant are a tuple, (part,) for one; got {parts!r}")
     builder.AddNamedSystem("robot", plant)
     target = plant.GetInputPort("external_wrench")
     if not parts:
@@ -68,9 +106,10 @@ def add_plant(
     builder.Connect(total.get_output_port(), target)
     for number, slot in enumerate(parts, 1):
         part = made(slot, robot, "part of the plant")
-        builder.AddNamedSystem(_free_name(builder, part, f"part_{number}"), part)
+        name = _free_name(builder, part, f"part_{number}")
+        add_once(builder, name, part, "part of the plant")
         if not part.HasOutputPort("wrench"):
-            raise ValueError(f'{part!r} has no output "wrench" on the platform')
+            raise ValueError(f'{class_of(part)} has no output "wrench" on the platform')
         builder.Connect(part.GetOutputPort("wrench"), total.get_input_port(number))
         for i in range(part.num_input_ports()):
             port = part.get_input_port(i)
@@ -99,15 +138,16 @@ def add_reference(
         wanted: inputs by the name of what they want.
 
     Raises:
-        ValueError: it has no output "desired_pose".
+        TypeError: it is none.
+        ValueError: it has no output "desired_pose", or is in a diagram already.
     """
     system = None
     if reference is not None:
         if isinstance(reference, Trajectory):
             reference = TrajectoryReference(reference)
-        system = builder.AddNamedSystem("reference", made(reference, robot, "reference"))
+        system = add_once(builder, "reference", made(reference, robot, "reference"), "reference")
         if not system.HasOutputPort("desired_pose"):
-            raise ValueError(f'the reference {system!r} has no output "desired_pose"')
+            raise ValueError(f'the reference, {class_of(system)}, has no output "desired_pose"')
         builder.ExportOutput(system.GetOutputPort("desired_pose"), "desired_pose")
     for name, ports in wanted.items():
         if not ports:

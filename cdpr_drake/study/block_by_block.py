@@ -177,7 +177,7 @@ def pieces(diagram: Diagram, context: Context) -> Pieces:
         context: the point.
 
     Raises:
-        LinearizationError: a block without AutoDiffXd has an abstract input, or an input open that
+        LinearizationError: a block has an abstract input that is connected, or an input open that
             it needs.
     """
     inside = tuple(blocks(diagram))
@@ -207,11 +207,12 @@ def _output(path: tuple[str, ...], system: System, index: int) -> _Key:
 
 def _piece(block: Block, own: Context) -> Piece:
     system = block.system
-    if len(vector_inputs(system)) < system.num_input_ports():
+    ports = vector_inputs(system)
+    others = {system.get_input_port(i) for i in range(system.num_input_ports())} - set(ports)
+    if any(port.HasValue(own) for port in others):  # a MultibodyPlant has some, open
         raise LinearizationError(f"{block} takes an abstract input, which has no derivative")
     x = own.get_continuous_state_vector().CopyToVector()
     d = [own.get_discrete_state(i).CopyToVector() for i in range(len(block.group_sizes))]
-    ports = vector_inputs(system)
     u = [port.Eval(own) if port.HasValue(own) else None for port in ports]
     shown = [np.zeros(p.size()) if v is None else v for p, v in zip(ports, u, strict=True)]
     parts = [x, *d, *shown]

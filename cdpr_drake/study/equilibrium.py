@@ -8,14 +8,24 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, Diagram
+from pydrake.systems.framework import Context, Diagram, PortDataType
 
 from cdpr_drake.diagrams.blocks import Block, blocks, continuous_state_names, discrete_state_names
-from cdpr_drake.diagrams.rest import TOLERANCE, cables_of, fix_inputs, rest_context, robot_of
+from cdpr_drake.diagrams.rest import (
+    TOLERANCE,
+    cables_of,
+    fix_inputs,
+    rest_context,
+    robot_of,
+    settle,
+)
 from cdpr_drake.errors import EquilibriumError, GeometryError, TensionError
 from cdpr_drake.model.rotations import as_pose, pose_to_vector
 from cdpr_drake.model.statics import DEFAULT_RULE
 from cdpr_drake.study.state_space import Array
+
+MOMENT = 0.05
+"""How long [s] after its rest an all-continuous loop is looked at once more: nothing may move."""
 
 
 def equilibrium(
@@ -37,7 +47,8 @@ def equilibrium(
 
     Raises:
         EquilibriumError: there is no such rest, or a residual is above 1e-9 of the largest term of
-            its equation; names residual and limiting cable.
+            its equation, now or a moment later: under a moving reference nothing rests. Names the
+            residual, and what moves or the limiting cable.
         ValueError: an unknown rule for the tensions.
     """
     for block in blocks(loop):
@@ -53,14 +64,17 @@ def equilibrium(
     except (TensionError, GeometryError) as error:  # these name the limiting cable
         raise EquilibriumError(str(error)) from None
     fix_inputs(loop, context, {"desired_pose"}, pose_to_vector(desired))
-    context.SetTime(settled_time(loop))
-    rest = residuals(loop, context)
-    if not rest.largest <= TOLERANCE:
-        cable = _slackest_cable(loop, context)
-        raise EquilibriumError(
-            f"not at rest: {rest.worst} changes by {rest.largest:.2e} of the largest term of its "
-            f"equation; limiting cable {cable}"
-        )
+    time = settled_time(loop)
+    context.SetTime(time)
+    settle(loop, context)
+    for moment in (time + (sample_period(loop) or MOMENT), time):
+        context.SetTime(moment)
+        rest = residuals(loop, context)
+        if not rest.largest <= TOLERANCE:
+            raise EquilibriumError(
+                f"not at rest: {rest.worst} changes by {rest.largest:.2e} of the largest term of "
+                f"its equation; {_culprit(loop, context)}"
+            )
     return context
 
 
@@ -188,6 +202,27 @@ def _discrete_states(block: Block, own: Context) -> tuple[Array, Array]:
         return before, before
     after = system.EvalUniquePeriodicDiscreteUpdate(own)
     return before, np.concatenate([after.get_vector(i).CopyToVector() for i in groups])
+
+
+def _culprit(loop: Diagram, context: Context) -> str:
+    """Return what a residual may come from: a source that moves, or the slackest cable."""
+    sources = [block for block in blocks(loop) if not block.system.num_input_ports()]
+    time, shown = context.get_time(), []
+    for moment in (time, time + MOMENT):
+        context.SetTime(moment)
+        shown.append([_outputs(block, context) for block in sources])
+    for block, now, then in zip(sources, *shown, strict=True):
+        if not np.array_equal(now, then):
+            return f"{block} moves, and a loop rests only while what drives it stands still"
+    return f"limiting cable {_slackest_cable(loop, context)}"
+
+
+def _outputs(block: Block, context: Context) -> Array:
+    """Return all numbers that a block puts out."""
+    ports = map(block.system.get_output_port, range(block.system.num_output_ports()))
+    vectors = [p for p in ports if p.get_data_type() == PortDataType.kVectorValued]
+    own = block.context(context)
+    return np.concatenate([np.zeros(0), *(port.Eval(own) for port in vectors)])
 
 
 def _slackest_cable(loop: Diagram, context: Context) -> str:

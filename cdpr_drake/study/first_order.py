@@ -63,7 +63,10 @@ def first_order(
         diagram.EvalTimeDerivatives(context)
         for port in outputs:
             port.Eval(context)
-        return _assembled(pieces(diagram, context), inputs, outputs, discrete)
+        given = context.Clone()
+        for port in inputs:  # an open one would stay open, and have no effect
+            port.FixValue(given, port_value(port, context))
+        return _assembled(pieces(diagram, given), inputs, outputs, discrete)
     return _of_twin(twin, diagram, context, inputs, outputs, discrete)
 
 
