@@ -83,18 +83,18 @@ class InverseKinematics:
             TensionError: some cable would have to push.
         """
         k = self.robot.num_cables
-        out, H, jacobian = np.zeros(k), np.zeros(k), np.zeros((k, 6))
+        out, T, jacobian = np.zeros(k), np.zeros(k), np.zeros((k, 6))
         if self.rule != CLOSEST:
             if with_jacobian:
                 status = self._kernel.unstrained_lengths_jacobian(
-                    *self._head, pose, *self._robot_arrays, out, H, jacobian
+                    *self._head, pose, *self._robot_arrays, out, T, jacobian
                 )
             else:
                 arrays = self._robot_arrays
-                status = self._kernel.unstrained_lengths(*self._head, pose, *arrays, out, H)
+                status = self._kernel.unstrained_lengths(*self._head, pose, *arrays, out, T)
             if status < 0:
                 raise GeometryError("the wrench matrix has rank below 6 at the desired pose")
-            if self._heeds_limits(pose, H, status):
+            if self._heeds_limits(pose, T, status):
                 return out + self.robot.cable.drum_run, jacobian
         if with_jacobian:
             steps = STEP * np.eye(6)
@@ -102,15 +102,14 @@ class InverseKinematics:
             jacobian = np.array([(ahead - behind) / (2.0 * STEP) for ahead, behind in ends]).T
         return self._bounded(pose) + self.robot.cable.drum_run, jacobian
 
-    def _heeds_limits(self, pose: Array, H: Array, status: int) -> bool:
+    def _heeds_limits(self, pose: Array, T: Array, status: int) -> bool:
         """Return whether tensions of least norm whatever the limits are what the rule asks for."""
-        geometry = cable_geometry(self.robot, pose)
         if self.rule == DEFAULT_RULE:
             low, high = self.robot.cable.limits
-            T = H * geometry.L / geometry.Bx
-            return bool(status == 0 and np.all(low <= T) and np.all(high >= T))
+            return status == 0 and bool(T.min() >= low and T.max() <= high)
         if status == 0:
             return True
+        geometry = cable_geometry(self.robot, pose)
         wrench = weight_wrench(self.robot, geometry)
         allowed = what_limits_allow(self.robot, wrench_matrix(geometry), wrench)
         raise TensionError(

@@ -1,7 +1,7 @@
 """Inverse kinematics (eqs. 6 to 9) with minimum-norm statics, in real or complex numbers.
 
 Arguments in common: model, order: the cable model's index and the order of its series; pose (6,)
-[roll, pitch, yaw, x, y, z]; points, body, stiffness: as in `model.arrays`; out (k,) [m] and H (k,)
+[roll, pitch, yaw, x, y, z]; points, body, stiffness: as in `model.arrays`; out (k,) [m] and T (k,)
 [N]: results; jacobian (k, 6): of out.
 """
 
@@ -16,11 +16,11 @@ from cdpr_drake.model.kernels.servo import STEP, least_norm, rpy_matrix
 
 
 @jit
-def unstrained_lengths(model, order, pose, points, body, stiffness, out, H):
-    """Write the spans' unstrained lengths (k,) and horizontal tensions H (k,) at a pose (6,).
+def unstrained_lengths(model, order, pose, points, body, stiffness, out, T):
+    """Write the spans' unstrained lengths (k,) and chord tensions T (k,) at a pose (6,).
 
-    H is the minimum-norm solution of the static balance (A.2). Returns 0, -1 at a rank below 6, or
-    the number of a cable that would push.
+    The horizontal tensions are the minimum-norm solution of the static balance (A.2). Returns 0, -1
+    at a rank below 6, or the number of a cable that would push.
     """
     drawing, attachment = points[0], points[1]
     k = drawing.shape[0]
@@ -41,6 +41,7 @@ def unstrained_lengths(model, order, pose, points, body, stiffness, out, H):
         load[0] -= arm[1] * half
         load[1] += arm[0] * half
         load[5] -= half
+    H = np.zeros(k, pose.dtype)
     if not least_norm(D, load, H):
         return -1
     status = 0
@@ -49,30 +50,31 @@ def unstrained_lengths(model, order, pose, points, body, stiffness, out, H):
             status = i + 1
             continue
         t = Bz[i] / Bx[i]
+        T[i] = H[i] * np.sqrt(1.0 + t * t)
         EA = stiffness[0] + 0.0 * H[i]
         if stiffness[1] != 0.0:
-            EA = stiffness[0] - stiffness[1] / (H[i] * np.sqrt(1.0 + t * t) + stiffness[2])
+            EA = stiffness[0] - stiffness[1] / (T[i] + stiffness[2])
         out[i], _, _, _ = length_and_row(model, order, Bx[i], Bz[i], H[i], w, EA)
     return status
 
 
 @jit
-def unstrained_lengths_jacobian(model, order, pose, points, body, stiffness, out, H, jacobian):
+def unstrained_lengths_jacobian(model, order, pose, points, body, stiffness, out, T, jacobian):
     """As `unstrained_lengths`, with the Jacobian (k, 6) with respect to the pose vector."""
     k = points.shape[1]
     zc = np.zeros(6, np.complex128)
     yc = np.zeros(k, np.complex128)
-    Hc = np.zeros(k, np.complex128)
+    Tc = np.zeros(k, np.complex128)
     for j in range(6):
         zc[j] = pose[j]
     for j in range(6):
         zc[j] = zc[j] + STEP * 1j
-        status = unstrained_lengths(model, order, zc, points, body, stiffness, yc, Hc)
+        status = unstrained_lengths(model, order, zc, points, body, stiffness, yc, Tc)
         if status != 0:
             return status
         zc[j] = pose[j]
         for i in range(k):
             jacobian[i, j] = yc[i].imag / STEP
             out[i] = yc[i].real
-            H[i] = Hc[i].real
+            T[i] = Tc[i].real
     return 0
