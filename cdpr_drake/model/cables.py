@@ -87,10 +87,9 @@ class CableSet:
         R = RollPitchYaw(state[:3]).ToRotationMatrix().matrix()
         self._geometry.attachment_motion(R, *state[3:].reshape(3, 3), attachment, p_WB, v_WB)
         out, local = np.empty((k, WIDTH)), np.zeros((k, WIDTH, 8))
-        self._catenary.cable_forces_jacobian(
-            drawing, p_WB, v_WB, length, rate, float(constants[0]), self.arrays.stiffness,
-            self.arrays.run, float(constants[4]), out, local,
-        )  # fmt: skip
+        self._catenary.robot_forces_jacobian(
+            drawing, p_WB, v_WB, length, rate, constants, out, local
+        )
         EB = p_WB - state[3:6]
         points = _point_jacobian(state, EB)
         jacobian = np.zeros((k, WIDTH, 12 + 2 * k))

@@ -70,7 +70,7 @@ def rest_state(
         TensionError: no such tensions.
         EquilibriumError: the iteration did not converge.
     """
-    from cdpr_drake.model.kernels.catenary import irvine_from_horizontal
+    from cdpr_drake.model.kernels.catenary import robot_length
 
     X_WP = as_pose(pose)
     geometry = cable_geometry(robot, X_WP)
@@ -78,30 +78,26 @@ def rest_state(
     check_rank(matrix)
     external = np.zeros(6) if wrench is None else np.asarray(wrench, float)
     load = gravity_wrench(robot, X_WP) + external
-    w, cable = robot.weight_per_metre, robot.cable
-    k = robot.num_cables
+    k, arrays = robot.num_cables, RobotArrays(robot)
     sin_beta0 = geometry.Bz / geometry.L
-    sag = 0.5 * w * geometry.L  # V_B - T sin(beta0): the part of theta_B that is not along u
-    T = np.zeros(k)
-    V_B, l0, T_A = np.zeros(k), np.zeros(k), np.zeros(k)
-    EA = np.full(k, cable.stiffness(robot.mass * robot.gravity / k))
+    sag = (
+        0.5 * robot.weight_per_metre * geometry.L
+    )  # V_B - T sin(beta0): the part of theta_B that is not along u
+    T, V_B, length = np.zeros(k), np.zeros(k), np.zeros(k)
     upwards = wrench_at(geometry.EB, geometry.z)
     for _ in range(200):
         previous = T
         T = distribute(robot, matrix, load - upwards.T @ sag, rule, X_WP)
         H = T * geometry.Bx / geometry.L
         for i in range(k):
-            V_B[i], l0[i], status = irvine_from_horizontal(
-                geometry.Bx[i], geometry.Bz[i], H[i], w, EA[i]
+            V_B[i], length[i], status = robot_length(
+                geometry.Bx[i], geometry.Bz[i], H[i], arrays.run[i], arrays.constants
             )
             if status:
                 raise EquilibriumError(f"cable {i + 1} has no catenary at H = {H[i]:.3g} N")
         sag = V_B - T * sin_beta0
-        T_A = np.hypot(H, V_B - w * l0)
-        EA = np.array([cable.stiffness(t) for t in T_A])
         if np.max(np.abs(T - previous)) <= 1e-14 * np.max(np.abs(T)):
             break
-    length = l0 + cable.drum_run / (1.0 + T_A / EA)
     unbalanced, _, out = platform_balance(robot, X_WP, length)
     residual = _relative(robot, unbalanced + external)
     if not residual <= 1e3 * TOLERANCE:

@@ -838,6 +838,24 @@ def cable_forces_jacobian(
 
 
 @jit
+def robot_forces(p_WA, p_WB, v_WB, length, length_rate, constants, out):
+    """As `cable_forces`, with the cables' `constants` packed as in `model.arrays`."""
+    return cable_forces(
+        p_WA, p_WB, v_WB, length, length_rate, float(constants[0]), constants[1:4],
+        constants[6:], float(constants[4]), out,
+    )  # fmt: skip
+
+
+@jit
+def robot_forces_jacobian(p_WA, p_WB, v_WB, length, length_rate, constants, out, jacobian):
+    """As `cable_forces_jacobian`, with the cables' `constants` packed as in `model.arrays`."""
+    return cable_forces_jacobian(
+        p_WA, p_WB, v_WB, length, length_rate, float(constants[0]), constants[1:4],
+        constants[6:], float(constants[4]), out, jacobian,
+    )  # fmt: skip
+
+
+@jit
 def irvine_row_softening(Bx, Bz, H, w, asymptote, softening, offset):
     """The span that carries the horizontal tension H, for EA(T_A), and its derivatives.
 
@@ -914,3 +932,19 @@ def irvine_from_horizontal(Bx, Bz, H, w, EA):
     """Return (V_B, l0, status) of the span that carries the horizontal tension H."""
     V_B, l0, _a, _b, _c, _d, _e, _f, status = irvine_row_softening(Bx, Bz, H, w, EA, 0.0, 0.0)
     return V_B, l0, status
+
+
+@jit
+def robot_length(Bx, Bz, H, run, constants):
+    """Return (V_B, total unstrained length, status) of a cable that carries the tension H at rest.
+
+    With the cables' `constants` packed as in `model.arrays`, and its own run from drum to eyelet.
+    """
+    w, asymptote, softening, offset = constants[0], constants[1], constants[2], constants[3]
+    V_B, l0, _a, _b, _c, _d, _e, _f, status = irvine_row_softening(
+        Bx, Bz, H, w, asymptote, softening, offset
+    )
+    V_A = V_B - w * l0
+    T_A = math.sqrt(H * H + V_A * V_A)
+    EA = asymptote - softening / (T_A + offset)
+    return V_B, l0 + run / (1.0 + T_A / EA), status

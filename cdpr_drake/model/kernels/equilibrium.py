@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from cdpr_drake.model.kernels import jit
-from cdpr_drake.model.kernels.catenary import cable_forces_jacobian
+from cdpr_drake.model.kernels.catenary import robot_forces_jacobian
 from cdpr_drake.model.kernels.geometry import attachment_motion, cross, turned, vector
 
 MAX_ROTATION = 0.3  # of one step [rad]
@@ -50,10 +50,9 @@ def balance(R, p, length, points, constants, body, out, jacobian, wrench, stiffn
     p_WB, v_WB = np.zeros((k, 3)), np.zeros((k, 3))
     still = np.zeros(3)
     attachment_motion(R, p, still, still, points[1], p_WB, v_WB)
-    status = cable_forces_jacobian(
-        points[0], p_WB, v_WB, length, np.zeros(k), float(constants[0]), constants[1:4],
-        constants[6:], float(constants[4]), out, jacobian,
-    )  # fmt: skip
+    status = robot_forces_jacobian(
+        points[0], p_WB, v_WB, length, np.zeros(k), constants, out, jacobian
+    )
     if status:
         return status
     weight = float(body[0])

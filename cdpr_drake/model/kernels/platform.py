@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.model.kernels import jit
-from cdpr_drake.model.kernels.catenary import cable_forces
+from cdpr_drake.model.kernels.catenary import robot_forces
 from cdpr_drake.model.kernels.geometry import attachment_motion, cross, vector
 from cdpr_drake.model.kernels.servo import rpy_matrix
 
@@ -29,10 +29,7 @@ def platform_cable_forces(state, length, rate, points, constants, packed):
     R = np.zeros((3, 3))
     rpy_matrix(float(state[0]), float(state[1]), float(state[2]), R)
     attachment_motion(R, state[3:6], state[6:9], state[9:12], points[1], p_WB, v_WB)
-    status = cable_forces(
-        points[0], p_WB, v_WB, length, rate,
-        float(constants[0]), constants[1:4], constants[6:], float(constants[4]), out,
-    )  # fmt: skip
+    status = robot_forces(points[0], p_WB, v_WB, length, rate, constants, out)
     x, y, z = vector(state[3:6])
     tx, ty, tz, sx, sy, sz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(k):
