@@ -18,6 +18,7 @@ from pydrake.systems.framework import Context, Diagram
 from cdpr_drake.diagrams.blocks import Block, blocks, fed_ports
 from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.model.equilibrium import RestState, forward_kinematics, rest_state
+from cdpr_drake.model.inverse_kinematics import lengths_at
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, as_pose, pose_to_vector
 from cdpr_drake.model.statics import DEFAULT_RULE
@@ -43,8 +44,7 @@ def rest_context(
         diagram: any diagram with a system that has cables (`CatenaryCableForce` or `FusedPlant`),
             whatever its blocks are called.
         pose: X_WP, or [roll, pitch, yaw, x, y, z] (rad, m).
-        tensions: one of `model.statics.RULES`; without effect in a
-            joint space loop.
+        tensions: one of `model.statics.RULES`; without effect in a joint space loop.
         seed: of the diagram's noise sources, each with a generator of its own by the seed and the
             name of the source; None leaves them to Drake, whose seeds differ from one context to
             the next.
@@ -190,9 +190,9 @@ def _rest_of_weight(
     for block in inside:
         asked_for = block.answer("motor_angles_at")
         if asked_for is not None:
-            winch = robot.winch
-            lengths = winch.encoder_zero_length + winch.transmission * asked_for(X_WP)
-            return forward_kinematics(robot, lengths, X_WP, wrench=wrench)
+            return forward_kinematics(
+                robot, lengths_at(robot, asked_for(X_WP)), X_WP, wrench=wrench
+            )
     return rest_state(robot, X_WP, tensions, wrench)
 
 

@@ -67,7 +67,7 @@ class InverseKinematics:
 
         Raises:
             GeometryError: the wrench matrix has rank below 6.
-            TensionError: some cable would have to push.
+            TensionError: the rule finds no tensions that hold the platform.
         """
         return self.lengths_and_jacobian(_vector(pose), with_jacobian=False)[0]
 
@@ -80,7 +80,7 @@ class InverseKinematics:
 
         Raises:
             GeometryError: the wrench matrix has rank below 6.
-            TensionError: some cable would have to push.
+            TensionError: the rule finds no tensions that hold the platform.
         """
         k = self.robot.num_cables
         out, T, jacobian = np.zeros(k), np.zeros(k), np.zeros((k, 6))
@@ -141,7 +141,7 @@ class InverseKinematics:
 
         Raises:
             GeometryError: the wrench matrix has rank below 6.
-            TensionError: some cable would have to push.
+            TensionError: the rule finds no tensions that hold the platform.
         """
         return motor_angles(self.robot, self.lengths(pose))
 
@@ -155,6 +155,16 @@ def motor_angles(robot: CableRobot, lengths: ArrayLike) -> Array:
     """
     winch = robot.winch
     return (np.asarray(lengths, float) - winch.encoder_zero_length) / winch.transmission
+
+
+def lengths_at(robot: CableRobot, angles: Array) -> Array:
+    """Return the total unstrained lengths (k,) [m] of the cables at given motor angles.
+
+    Args:
+        robot: the robot, for the transmission and the length at encoder zero.
+        angles: (k,) [rad].
+    """
+    return robot.winch.encoder_zero_length + robot.winch.transmission * angles
 
 
 def _vector(pose: RigidTransform | ArrayLike) -> Array:

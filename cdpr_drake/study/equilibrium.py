@@ -42,8 +42,8 @@ def equilibrium(
         loop: any diagram with cables; its desired pose is an input that feeds ports
             "desired_pose", or none. Nothing has to be exported.
         pose: desired X_WP, or [roll, pitch, yaw, x, y, z] (rad, m).
-        tensions: one of `model.statics.RULES`; without effect under
-            joint space control, where the winches' angles decide.
+        tensions: one of `model.statics.RULES`; without effect under joint space control, where the
+            winches' angles decide.
 
     Raises:
         EquilibriumError: there is no such rest, or a residual is above 1e-9 of the largest term of

@@ -15,6 +15,7 @@ from pydrake.systems.framework import (
 
 from cdpr_drake.model.cables import CableSet, packed_sizes
 from cdpr_drake.model.equilibrium import RestState
+from cdpr_drake.model.inverse_kinematics import lengths_at
 from cdpr_drake.model.rest_model import mass_matrix
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, pose_to_vector, vector_to_pose
@@ -243,9 +244,8 @@ class FusedPlant(LeafSystem):
 
     def _motion(self, y: Array) -> tuple[Array, Array]:
         """Return unstrained lengths (k,) [m] and their rates (k,) [m/s]."""
-        winch, k = self.robot.winch, self._k
-        length = winch.encoder_zero_length + winch.transmission * y[12 : 12 + k]
-        return length, winch.transmission * y[12 + k : 12 + 2 * k]
+        k, rates = self._k, y[12 + self._k : 12 + 2 * self._k]
+        return lengths_at(self.robot, y[12 : 12 + k]), self.robot.winch.transmission * rates
 
     def _desired(self, context: Context) -> Array:
         """Return the desired motor angles (k,) [rad]."""

@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from cdpr_drake.model.cable_models import cable_model_name
-from cdpr_drake.model.inverse_kinematics import InverseKinematics
+from cdpr_drake.model.inverse_kinematics import InverseKinematics, motor_angles
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, exp_rotation, pose_to_vector
 from cdpr_drake.model.servo import pose_error, servo_twist
@@ -50,8 +50,6 @@ class InverseKinematicsAngles(LeafSystem):
         self.robot, self.cable_model = robot, cable_model_name(cable_model)
         self.rule = rule
         self._inverse = InverseKinematics(robot, cable_model, rule=rule)
-        winch = robot.winch
-        self._zero, self._transmission = winch.encoder_zero_length, winch.transmission
         self._pose_port = self.DeclareVectorInputPort("desired_pose", 6)
         self.DeclareVectorOutputPort(
             "motor_angles", robot.num_cables, self._calc_angles, {self._pose_port.ticket()}
@@ -66,9 +64,9 @@ class InverseKinematicsAngles(LeafSystem):
         check_finite(value(pose), self, context, "input desired_pose")
         plain = not pose.dtype.hasobject
         lengths, jacobian = self._inverse.lengths_and_jacobian(value(pose), not plain)
-        angles = (lengths - self._zero) / self._transmission
+        angles = motor_angles(self.robot, lengths)
         if not plain:
-            angles = chain(angles, jacobian / self._transmission, pose)
+            angles = chain(angles, jacobian / self.robot.winch.transmission, pose)
         output.SetFromVector(angles)
 
 
