@@ -15,7 +15,7 @@ from cdpr_drake.model.vision.cameras import camera_problems
 if TYPE_CHECKING:
     from cdpr_drake.model.robot import CableRobot
 
-_STEEL = 7850.0  # kg/m3
+_STEEL, _FIBRE = 7850.0, (500.0, 1500.0)  # kg/m3, of ropes of fibres over their gross section
 
 Problems = Iterator[tuple[str, str]]
 
@@ -130,9 +130,9 @@ def oddities(robot: CableRobot) -> Problems:
         robot: a valid robot.
     """
     density = robot.cable.linear_density / robot.cable.section
-    if abs(density / _STEEL - 1.0) > 0.1:
-        steel = f"steel has {_STEEL:.0f} kg/m3"
-        yield "cable.linear_density", f"over section it is {density:.0f} kg/m3; {steel}"
+    if abs(density / _STEEL - 1.0) > 0.1 and not _FIBRE[0] <= density <= _FIBRE[1]:
+        usual = "steel has {:.0f} kg/m3, ropes of fibres have {:.0f} to {:.0f}".format(_STEEL, *_FIBRE)
+        yield "cable.linear_density", f"over section it is {density:.0f} kg/m3; {usual}"
 
 
 def _shapes(robot: CableRobot) -> Problems:
