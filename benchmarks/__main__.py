@@ -18,6 +18,7 @@ FOLDER = Path(__file__).resolve().parent
 
 QUICK = {
     "catenary": ["--count", "100000", "--rounds", "2"],
+    "distribution": ["--poses", "10", "--rounds", "2"],
     "images": ["--frames", "3", "--repeats", "3"],
     "integrators": ["--until", "4", "--rounds", "1"],
     "loop": ["--rounds", "1", "--until", "5"],

@@ -76,7 +76,7 @@ def test_the_gain_follows_its_limit_down_to_hardly_any_damping(large: CableRobot
     gains = []
     for factor in (1.0, 0.1, 1e-2, 0.0):
         robot = damped(large, factor)
-        _, goal = move_near_the_middle(robot)
+        goal = RigidTransform([3.6, 0.1, 15.5])  # higher up, no gain is stable without damping
         found = default_gain(robot, goal)
         servo = SampledServo(robot, goal)
         assert found.limit is not None and found.decided_by == "limit"

@@ -18,6 +18,7 @@ sys.path.append(str(Path(__file__).resolve().parents[1]))  # behind what is inst
 
 from benchmarks import (
     bench_catenary,
+    bench_distribution,
     bench_integrators,
     bench_peers_cable,
     bench_peers_equilibrium,
@@ -34,6 +35,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 SMALLEST: dict[str, tuple[Any, str]] = {
     "catenary": (bench_catenary, "--count 140 --rounds 1"),
+    "distribution": (bench_distribution, "--poses 3 --rounds 1"),
     "integrators": (bench_integrators, "--until 0.1 --rounds 1"),
     "peers_cable": (bench_peers_cable, "--count 600 --peer-count 6 --rounds 1"),
     "peers_equilibrium": (bench_peers_equilibrium, "--count 20 --poses 1 --rounds 1"),

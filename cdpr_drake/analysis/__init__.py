@@ -15,6 +15,7 @@ from cdpr_drake.analysis.gain_matrix import (
     map_gain_matrix,
     target_twist,
 )
+from cdpr_drake.analysis.home import is_wrench_feasible, level_workspace, middle_of_workspace
 from cdpr_drake.analysis.neutral import (
     NeutralDirections,
     internal_tension,
@@ -59,8 +60,11 @@ __all__ = [
     "gain_matrix",
     "internal_tension",
     "internal_tension_drift",
+    "is_wrench_feasible",
+    "level_workspace",
     "lowest_gain",
     "map_gain_matrix",
+    "middle_of_workspace",
     "neutral_directions",
     "platform_modes",
     "stability_map",

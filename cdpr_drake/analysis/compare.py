@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analysis.gain_matrix import GainMatrix, gain_matrix
+from cdpr_drake.analysis.home import is_wrench_feasible, middle_of_workspace
 from cdpr_drake.model.cable_models import CABLE_MODELS, cable_model_name
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.statics import DEFAULT_RULE
@@ -102,7 +103,7 @@ def compare_cable_models(
         robots: robots, or names of built-in ones.
         cable_models: of the law.
         poses: where, by the robot's name, X_WP or [roll, pitch, yaw, x, y, z] (rad, m);
-            `comparable_pose` for those not given.
+            `pose_to_compare` for those not given.
         believed: the robots as the controller knows them, by name; the true ones if not given.
         move: length of the moves judged, as a share of the robot's size.
         tensions: one of `model.statics.RULES`.
@@ -116,7 +117,8 @@ def compare_cable_models(
     rows = []
     for item in robots:
         robot = item if isinstance(item, CableRobot) else load_robot(item)
-        pose = (poses or {}).get(robot.name, comparable_pose(robot))
+        pose = (poses or {}).get(robot.name)
+        pose = pose_to_compare(robot) if pose is None else pose
         ours = (believed or {}).get(robot.name)
         rows += [_compare(robot, ours, pose, model, move, tensions) for model in models]
     return Comparison(rows=tuple(rows))
@@ -137,6 +139,19 @@ def comparable_pose(
     middle = points.mean(axis=0)
     x, y = middle[:2] + distance * (points[toward - 1, :2] - middle[:2])
     return RigidTransform([x, y, height * middle[2]])
+
+
+def pose_to_compare(robot: CableRobot) -> RigidTransform:
+    """Return `comparable_pose` where the platform can be held there, else `middle_of_workspace`.
+
+    Args:
+        robot: the robot, with its payload.
+
+    Raises:
+        GeometryError, TensionError: it can nowhere be held level.
+    """
+    pose = comparable_pose(robot)
+    return pose if is_wrench_feasible(robot, pose) else middle_of_workspace(robot)
 
 
 def _compare(

@@ -310,7 +310,12 @@ class GainBand:
     def __str__(self) -> str:
         factors = f"{min(self.loss_factors):g} to {max(self.loss_factors):g}"
         times = f"{1e3 * min(self.damping_times):.2g} to {1e3 * max(self.damping_times):.2g} ms"
-        gains = f"{self.lowest:.3g} to {self.highest:.3g}/s"
+        searched = min(limit.searched for limit in self.limits)
+        low, high = (
+            f"{gain:.3g}" if math.isfinite(gain) else f"above {searched:.3g}"
+            for gain in (self.lowest, self.highest)
+        )
+        gains = f"{low}/s" if low == high else f"{low} to {high}/s"
         return f"{gains} for loss factors of the cables of {factors} (damping times of {times})"
 
 

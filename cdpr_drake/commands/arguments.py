@@ -157,7 +157,7 @@ NO_NOISE: dict[str, Any] = {"action": "store_true", "help": "perfect cameras and
 def add_place(
     parser: argparse.ArgumentParser,
     robot: dict[str, Any] = ROBOT,
-    default: str = "for CoGiRo Test 4's, else part of the way to cable 1's drawing point",
+    default: str = "for CoGiRo Test 4's, else the middle of the workspace",
 ) -> Any:
     """Add what `resolve_place` heeds and return its group; --tensions can be added to that.
 

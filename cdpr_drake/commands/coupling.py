@@ -27,7 +27,12 @@ if TYPE_CHECKING:
 def _add_arguments(parser: ArgumentParser) -> None:
     several = "built-in robots, or robot files (default: cogiro and its three larger versions)"
     robots = {**common.ROBOTS, "help": several}
-    what = common.add_place(parser, robots, "part of the way to cable 1's drawing point")
+    what = common.add_place(
+        parser,
+        robots,
+        "part of the way to cable 1's drawing point, or "
+        "the middle of its workspace where it cannot be held there",
+    )
     what.add_argument("--tensions", **common.TENSIONS)
     how = parser.add_argument_group("how it is controlled")
     how.add_argument("--cable-model", **common.CABLE_MODELS,
@@ -75,7 +80,7 @@ COMMAND = Command(
 def _compare(options: Namespace) -> Comparison:
     """Return the comparison, a robot at a time, with the count of them on stderr."""
     from cdpr_drake.analysis import Comparison, compare_cable_models
-    from cdpr_drake.analysis.compare import ROBOTS
+    from cdpr_drake.analysis.compare import ROBOTS, pose_to_compare
     from cdpr_drake.model.cable_models import CABLE_MODELS
 
     names = list(dict.fromkeys(options.robot or ROBOTS))
@@ -84,7 +89,7 @@ def _compare(options: Namespace) -> Comparison:
         raise ValueError("--test and --pose are for one robot, and robots differ in size")
     rows: list[ModelComparison] = []
     for name in counted(names, "robots"):
-        robot, pose, _, tensions, _ = resolve_place(options, name, default_test=None)
+        robot, pose, _, tensions, _ = resolve_place(options, name, None, pose_to_compare)
         poses = {robot.name: pose}
         rows += compare_cable_models([robot], models, poses=poses, tensions=tensions).rows
     return Comparison(rows=tuple(rows))

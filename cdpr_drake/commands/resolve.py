@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 from argparse import Namespace
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cdpr_drake.commands import UsageError
@@ -40,7 +40,7 @@ class Place(NamedTuple):
 
     def __str__(self) -> str:
         """Robot, mass and place as part of a sentence."""
-        x, y, z = self.pose.translation()
+        x, y, z = self.pose.translation().round(2) + 0.0  # never "-0.00"
         rule = f", tensions {self.tensions}" if self.asked else ""
         where = f"{self.where}, ({x:.2f}, {y:.2f}, {z:.2f}) m"
         return f"{self.robot.name}, {self.robot.mass:g} kg, {where}{rule}"
@@ -76,25 +76,32 @@ class Move(NamedTuple):
 
 
 def resolve_place(
-    options: Namespace, robot: str | None = None, default_test: int | None = DEFAULT_TEST
+    options: Namespace,
+    robot: str | None = None,
+    default_test: int | None = DEFAULT_TEST,
+    elsewhere: Callable[[CableRobot], RigidTransform] | None = None,
 ) -> Place:
-    """Return where a question is asked: at a pose, a test's goal, or a comparable pose of robots.
+    """Return where a question is asked: at a pose, a test's goal, or the middle of the workspace.
 
     Args:
         options: with payload, test, pose and tensions.
         robot: name or file; that of the options if None.
         default_test: at whose goal CoGiRo is without test and pose, if at any.
+        elsewhere: where other robots are then; in the middle of their workspace if None.
     """
-    from cdpr_drake.analysis import comparable_pose
+    from cdpr_drake.analysis import middle_of_workspace
     from cdpr_drake.model.rotations import as_pose
 
     default_test = default_test if options.pose is None else None
     found, number, test = _robot_and_test(options, robot or options.robot, default_test)
-    pose, where = comparable_pose(found), "on the way to the drawing point of cable 1"
-    if test is not None:
-        pose, where = test.poses(found)[1], f"at the goal of Test {number}"
     if options.pose is not None:
         pose, where = as_pose(options.pose), "at the pose asked for"
+    elif test is not None:
+        pose, where = test.poses(found)[1], f"at the goal of Test {number}"
+    elif elsewhere is not None:
+        pose, where = elsewhere(found), "where such robots are compared"
+    else:
+        pose, where = middle_of_workspace(found), "in the middle of its workspace"
     return Place(
         found, pose, where, resolve_rule(options, test is not None), options.tensions is not None
     )

@@ -131,7 +131,9 @@ def oddities(robot: CableRobot) -> Problems:
     """
     density = robot.cable.linear_density / robot.cable.section
     if abs(density / _STEEL - 1.0) > 0.1 and not _FIBRE[0] <= density <= _FIBRE[1]:
-        usual = "steel has {:.0f} kg/m3, ropes of fibres have {:.0f} to {:.0f}".format(_STEEL, *_FIBRE)
+        usual = "steel has {:.0f} kg/m3, ropes of fibres have {:.0f} to {:.0f}".format(
+            _STEEL, *_FIBRE
+        )
         yield "cable.linear_density", f"over section it is {density:.0f} kg/m3; {usual}"
 
 

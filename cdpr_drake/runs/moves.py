@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analysis.home import is_wrench_feasible, level_workspace, middle_of_workspace
 from cdpr_drake.model.robot import CableRobot
 
-START_HEIGHT, RISE, SHIFT = 0.3, 0.1, 0.05
+RISE, SHIFT = 0.1, 0.05
 
 DECAYS, LONGEST = 8.0, 400.0
 """How long a move takes by default: time constants of its gain, but at most so long [s]."""
@@ -23,19 +24,26 @@ def time_for(gain: float) -> float:
 
 
 def move_near_the_middle(robot: CableRobot) -> tuple[RigidTransform, RigidTransform]:
-    """Return X_WP at the start and the goal of a short level move near the middle of a robot.
+    """Return X_WP at the start and the goal of a short level move in the middle of a robot's reach.
 
-    It starts under the centroid of the drawing points at 30 % of their height over the ground (or
-    over the lowest of them, if that is below ground), rises by 10 % of it and moves along x by 5 %
-    of the room's length.
+    It starts at `middle_of_workspace`, rises by 10 % of the height of the workspace and moves along
+    x by 5 % of its length, or by as much less, in halves, as keeps it in there.
 
     Args:
-        robot: the robot.
+        robot: the robot, with its payload.
+
+    Raises:
+        GeometryError, TensionError: the platform can nowhere be held level.
     """
-    points = robot.drawing_points
-    ground = min(0.0, float(points[:, 2].min()))
-    height = float(points[:, 2].max()) - ground
-    centre = points.mean(axis=0)
-    start = np.array([centre[0], centre[1], ground + START_HEIGHT * height])
-    shift = np.array([SHIFT * float(np.ptp(points[:, 0])), 0.0, RISE * height])
-    return RigidTransform(start), RigidTransform(start + shift)
+    places = level_workspace(robot)
+    start = middle_of_workspace(robot, places)
+    shift = np.array([SHIFT, 0.0, RISE]) * np.ptp(places, axis=0)
+    shares = 0.5 ** np.arange(10)
+    share = next((share for share in shares if _is_free(robot, start, share * shift)), shares[-1])
+    return start, RigidTransform(start.translation() + share * shift)
+
+
+def _is_free(robot: CableRobot, start: RigidTransform, shift: np.ndarray) -> bool:
+    """Return whether the platform can be held on all of a straight way."""
+    way = start.translation() + np.linspace(0.0, 1.0, 11)[1:, None] * shift
+    return all(is_wrench_feasible(robot, RigidTransform(p)) for p in way)
