@@ -76,7 +76,7 @@ def test_where_the_world_has_its_origin_does_not_matter(name: str) -> None:
 def test_a_robot_that_can_hold_its_platform_nowhere_says_why() -> None:
     robot = load_robot("ipanema-2")
     heavy = robot.with_payload(1000.0)
-    with pytest.raises(TensionError, match="none of 729 places .* would have to give way by"):
+    with pytest.raises(TensionError, match=r"none of 729 places .* would have to give way by"):
         level_workspace(heavy)
     few = robot.replace(
         drawing_points=robot.drawing_points[:4], attachment_points=robot.attachment_points[:4],
