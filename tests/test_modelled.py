@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from system_checks import documented_ports, feedthrough, input_sizes, output_sizes
 
-from cdpr_drake.analysis import comparable_pose, gain_matrix
+from cdpr_drake.analysis import comparable_pose, gain_matrix, middle_of_workspace
 from cdpr_drake.analysis.modelled_gain import modelled_gain_matrix
 from cdpr_drake.diagrams import (
     ModelledSensing,
@@ -48,6 +48,14 @@ def test_at_rest_with_least_norm_tensions_the_model_is_nearly_right(
     # Without sag it would be wrong by much more.
     chords = cable_geometry(robot, pose).u
     assert np.linalg.norm(chords - model.tangents, axis=1).max() > 5.0 * radians
+
+
+@pytest.mark.parametrize("name", ["ipanema-2", "segesta-10", "acrobot"])
+def test_modelled_tensions_follow_the_default_rule(name: str) -> None:
+    robot = load_robot(name)
+    pose = middle_of_workspace(robot)
+    expected = rest_state(robot, pose).tension_at_drawing_point
+    np.testing.assert_allclose(modelled_tensions(robot, pose), expected, rtol=1e-3)
 
 
 def test_a_cable_that_would_have_to_push_hangs_slack(cogiro: CableRobot) -> None:

@@ -1,6 +1,6 @@
 """What each sensor is worth: one move with all sensors, and with some of them taken away.
 
-Without load cells the law takes the tensions of least norm at the measured pose, without tangent
+Without load cells the law takes tensions of least norm within the limits, without tangent
 cameras the tangents of parabolas there (`model/modelled.py`). Every set of sensors makes the same
 runs: a seed decides the noise and the fixed bias of each target in each image, so that differences
 to all sensors are taken seed by seed.

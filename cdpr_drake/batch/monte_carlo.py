@@ -61,8 +61,9 @@ def base_case(
         "sample_time": robot.cameras.sample_time,
         "latency": robot.cameras.latency,
     }
-    start, goal = move_near_the_middle(robot)
-    if test is not None:
+    if test is None:
+        start, goal = move_near_the_middle(robot)
+    else:
         found = paper_test(test)
         robot = found.carried_by(robot)
         start, goal = found.poses(robot)

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 
+from cdpr_drake.errors import TensionError
 from cdpr_drake.model.cable_models import cable_angles, horizontal_tension
+from cdpr_drake.model.distribution import minimum_norm_within
 from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array
@@ -24,9 +26,10 @@ SLACK = 0.05
 
 
 def modelled_tensions(robot: CableRobot, pose: RigidTransform | ArrayLike) -> Array:
-    """Return the tensions at the drawing points (k,) [N]: those of least norm that hold the weight.
+    """Return the tensions at the drawing points (k,) [N]: of least norm within the limits.
 
-    A cable that would have to push at this pose hangs slack.
+    They hold the weight that the controller knows. Where none within the limits do, those of least
+    norm whatever the limits; a cable that would have to push then hangs slack.
 
     Args:
         robot: the robot as the controller knows it.
@@ -34,7 +37,11 @@ def modelled_tensions(robot: CableRobot, pose: RigidTransform | ArrayLike) -> Ar
     """
     geometry = cable_geometry(robot, pose)
     wrench = weight_wrench(robot, geometry)
-    chord = np.linalg.lstsq(wrench_matrix(geometry), wrench, rcond=None)[0]
+    matrix = wrench_matrix(geometry)
+    try:
+        chord = minimum_norm_within(matrix, wrench, *robot.cable.limits)
+    except TensionError:
+        chord = np.linalg.lstsq(matrix, wrench, rcond=None)[0]
     w = robot.weight_per_metre
     H = np.maximum(chord * geometry.Bx / geometry.L, SLACK * w * geometry.Bx)
     return cable_angles(geometry.Bx, geometry.Bz, H, w, "SCMWE").T_A

@@ -89,6 +89,9 @@ class AxialStiffness(Record):
 class Cable(Record):
     """The cables: all of one kind, but for the run between drum and drawing point.
 
+    The limits are those of a distribution's tensions along the chords; at its ends a cable bears up
+    to half of its weight more or less.
+
     Args:
         linear_density: [kg/m], per unstrained metre.
         diameter: [m].
