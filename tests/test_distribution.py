@@ -165,7 +165,9 @@ def test_bounds_may_be_equal_far_off_or_each_cable_s_own() -> None:
         lower[draw.integers(k)] = -100.0 * high
         fixed = int(draw.integers(k))
         lower[fixed] = upper[fixed] = 0.5 * (low + high)
-        inside = linprog(np.zeros(k), A_eq=A, b_eq=w, bounds=np.stack([lower, upper], 1)).status == 0
+        inside = (
+            linprog(np.zeros(k), A_eq=A, b_eq=w, bounds=np.stack([lower, upper], 1)).status == 0
+        )
         try:
             t = bounded_distribution(A, w, lower, upper, high)
         except TensionError as error:
