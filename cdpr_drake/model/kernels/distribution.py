@@ -99,7 +99,8 @@ def _newton(rows, q, is_free, r, v):
 def within_bounds(A, w, low, high, wish, q, t):
     """Write t (k,) of least sum q (t - wish)^2 with A t = w, low <= t <= high; return a status.
 
-    A (n, k), w (n,), the others (k,), q > 0; all finite. 0: found; 1: there are none; 2: neither was proved.
+    A (n, k), w (n,), the others (k,), q > 0; all finite. 0: found; 1: there are none; 2: neither
+    was proved.
     """
     n, k = A.shape
     rows, load, r = np.zeros((n, k)), np.zeros(n), np.zeros(n)
