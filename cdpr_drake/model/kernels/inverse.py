@@ -10,17 +10,17 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.model.kernels import jit
-from cdpr_drake.model.kernels.cable_models import length_and_row
+from cdpr_drake.model.kernels.cable_models import length_and_row_T
 from cdpr_drake.model.kernels.geometry import arm_and_chord, set_column, turned
-from cdpr_drake.model.kernels.servo import STEP, least_norm, rpy_matrix
+from cdpr_drake.model.kernels.servo import STEP, least_norm, norm_weight, rpy_matrix
 
 
 @jit
 def unstrained_lengths(model, order, pose, points, body, stiffness, out, T):
     """Write the spans' unstrained lengths (k,) and chord tensions T (k,) at a pose (6,).
 
-    The horizontal tensions are the minimum-norm solution of the static balance (A.2). Returns 0, -1
-    at a rank below 6, or the number of a cable that would push.
+    The horizontal tensions are the minimum-norm solution of the static balance (A.2), see
+    `servo.norm_weight`. Returns 0, -1 at a rank below 6, or the number of a cable that would push.
     """
     drawing, attachment = points[0], points[1]
     k = drawing.shape[0]
@@ -30,31 +30,33 @@ def unstrained_lengths(model, order, pose, points, body, stiffness, out, T):
     D = np.zeros((6, k), pose.dtype)
     Bx = np.zeros(k, pose.dtype)
     Bz = np.zeros(k, pose.dtype)
+    scale = np.zeros(k, pose.dtype)
     load = np.zeros(6, pose.dtype)
     Gx, Gy, _Gz = turned(R, body[1:4])
     load[0], load[1], load[5] = -Gy * body[0], Gx * body[0], -body[0]
     for i in range(k):
         arm, (ax, ay, Bz[i]) = arm_and_chord(i, R, pose[3:6], drawing, attachment)
         Bx[i] = np.sqrt(ax * ax + ay * ay)
-        set_column(i, arm, (ax / Bx[i], ay / Bx[i], Bz[i] / Bx[i]), D)
-        half = 0.5 * w * np.sqrt(Bx[i] * Bx[i] + Bz[i] * Bz[i])
+        L = np.sqrt(Bx[i] * Bx[i] + Bz[i] * Bz[i])
+        ux, uy = ax / L, ay / L
+        scale[i] = 1.0 / np.sqrt(norm_weight(ux * ux + uy * uy))
+        set_column(i, arm, (scale[i] * ux, scale[i] * uy, scale[i] * Bz[i] / L), D)
+        half = 0.5 * w * L
         load[0] -= arm[1] * half
         load[1] += arm[0] * half
         load[5] -= half
-    H = np.zeros(k, pose.dtype)
-    if not least_norm(D, load, H):
+    if not least_norm(D, load, T):
         return -1
     status = 0
     for i in range(k):
-        if not H[i].real > 0.0:
+        T[i] = scale[i] * T[i]
+        if not T[i].real > 0.0:
             status = i + 1
             continue
-        t = Bz[i] / Bx[i]
-        T[i] = H[i] * np.sqrt(1.0 + t * t)
-        EA = stiffness[0] + 0.0 * H[i]
+        EA = stiffness[0] + 0.0 * T[i]
         if stiffness[1] != 0.0:
             EA = stiffness[0] - stiffness[1] / (T[i] + stiffness[2])
-        out[i], _, _, _ = length_and_row(model, order, Bx[i], Bz[i], H[i], w, EA)
+        out[i], _, _, _ = length_and_row_T(model, order, Bx[i], Bz[i], T[i], w, EA)
     return status
 
 
