@@ -10,9 +10,13 @@ import numpy as np
 from pydrake.systems.framework import Context, Diagram
 
 from cdpr_drake.diagrams import make_simulator
+from cdpr_drake.diagrams.step import choose_step
 from cdpr_drake.study.modes import DEADBEAT
 from cdpr_drake.study.sampled import OnePeriodMap, one_period_map
 from cdpr_drake.study.state_space import Array
+
+LARGEST_STEP = 2.5e-3
+"""Of the integrator [s]: coarser ones damp a platform's modes visibly."""
 
 NEUTRAL_DISTANCE = 1e-7
 """Eigenvalues of a period's map this close to 1 are neutral."""
@@ -45,7 +49,7 @@ def simulate_modes(
     *,
     which: Sequence[int] = (0,),
     size: float = 1e-5,
-    max_step: float = 2.5e-3,
+    max_step: float | None = None,
 ) -> tuple[SimulatedMode, ...]:
     """Return how modes of a sampled loop grow or decay in a nonlinear simulation.
 
@@ -58,7 +62,8 @@ def simulate_modes(
         duration: [s].
         which: of the modes that are not neutral, 0 being the one of slowest decay.
         size: largest change of the platform's coordinates at the start, by each [m, rad].
-        max_step: step of the integrator [s]; coarse steps damp lightly damped modes by themselves.
+        max_step: step of the integrator [s]; if None, 2.5 ms, or less where the robot's modes need
+            it: coarser steps damp lightly damped modes by themselves.
 
     Raises:
         LinearizationError: the diagram is not a sampled loop of the kind `one_period_map` takes.
@@ -73,6 +78,8 @@ def simulate_modes(
     pose = [i for i, name in enumerate(period_map.states) if "platform/" in name][:6]
     shapes = right * size / np.abs(right[pose]).max(axis=0)
     _set_state(own, rest + shapes.real.sum(axis=1))
+    if max_step is None:
+        max_step = choose_step(diagram, own, largest=LARGEST_STEP).size
     simulator = make_simulator(diagram, own, max_step=max_step)
     simulator.Initialize()
     start, T = context.get_time(), period_map.period
