@@ -94,7 +94,7 @@ def prepare(setup: Setup) -> Prepared:
         warnings.warn(message, StabilityWarning, stacklevel=2)
     step = choose_step(loop, context, setup.max_step)
     if step.doubt:
-        warnings.warn(f"{setup.label}: {step.doubt}", StepWarning, stacklevel=2)
+        warnings.warn(step.doubt, StepWarning, stacklevel=2)
     return Prepared(setup=setup, loop=loop, context=context, step=step)
 
 
