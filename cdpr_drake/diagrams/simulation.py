@@ -142,7 +142,7 @@ def make_simulator(
     diagram: Diagram,
     context: Context,
     *,
-    max_step: float | None = None,
+    max_step: float | Step | None = None,
     accuracy: float | None = None,
     integrator: str = INTEGRATOR,
 ) -> Simulator:
@@ -155,7 +155,8 @@ def make_simulator(
         diagram: the diagram.
         context: where it starts, e.g. from `rest_context`.
         max_step: the integrator's step, its largest with error control [s]; if None, 0.01 s or the
-            part of it that the modes in this context need, see `choose_step`.
+            part of it that the modes in this context need, see `choose_step`. A `Step` that was
+            chosen beforehand is taken without a word.
         accuracy: for error control; fixed steps if None.
         integrator: as Drake calls it.
 
@@ -164,7 +165,7 @@ def make_simulator(
         RuntimeError: Drake has no such integrator, or none with or without error control.
     """
     step = _step(diagram, context, max_step, accuracy, integrator)
-    if step.doubt:
+    if step.doubt and step is not max_step:
         warnings.warn(step.doubt, StepWarning, stacklevel=2)
     return _simulator(diagram, context, step, accuracy, integrator)
 
@@ -228,11 +229,9 @@ def simulate(
     times: list[float] = []
     values: dict[str, list[np.ndarray]] = {name: [] for name in ports}
     watch = LimitWatch(robot_of(diagram))
-    step = max_step
-    if not isinstance(step, Step):
-        step = _step(diagram, context, step, accuracy, integrator)
-        if step.doubt:
-            warnings.warn(step.doubt, StepWarning, stacklevel=2)
+    step = _step(diagram, context, max_step, accuracy, integrator)
+    if step.doubt and step is not max_step:
+        warnings.warn(step.doubt, StepWarning, stacklevel=2)
     steps = StepWatch(diagram, context, step)
     simulator = _simulator(diagram, context, step, accuracy, integrator)
     begun = time.perf_counter()
@@ -264,7 +263,7 @@ def simulate(
 def _step(
     diagram: Diagram,
     context: Context,
-    max_step: float | None,
+    max_step: float | Step | None,
     accuracy: float | None,
     integrator: str,
 ) -> Step:
@@ -273,10 +272,11 @@ def _step(
     What a step must be is known of Runge-Kutta 3: another integrator gets the same if nobody gives
     one, and no opinion on one that is given.
     """
-    if max_step is not None:
-        _check_positive("the integrator's step, max_step,", max_step, " s")
+    if accuracy is not None and not (math.isfinite(accuracy) and accuracy > 0.0):
+        raise ValueError(f"the accuracy must be positive and finite, got {accuracy}")
+    if isinstance(max_step, Step):
+        return max_step
     if accuracy is not None:
-        _check_positive("the accuracy", accuracy)
         return Step(size=MAX_STEP if max_step is None else max_step, decided_by="accuracy")
     if max_step is not None and integrator != INTEGRATOR:
         return Step(size=max_step, decided_by="given")
@@ -296,11 +296,6 @@ def _simulator(
         config.accuracy = accuracy
     ApplySimulatorConfig(config, simulator)
     return simulator
-
-
-def _check_positive(what: str, value: float, unit: str = "") -> None:
-    if not (math.isfinite(value) and value > 0.0):
-        raise ValueError(f"{what} must be positive and finite, got {value}{unit}")
 
 
 def _vector_outputs(diagram: Diagram) -> dict[str, OutputPort]:

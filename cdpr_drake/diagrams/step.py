@@ -49,6 +49,9 @@ class Step:
             coarse for it, if it was given.
         suitable: the step that is chosen where none is given [s].
         since: the time [s] at which a run took to it; None from the start on.
+
+    Raises:
+        ValueError: a size that is not positive and finite.
     """
 
     size: float = MAX_STEP
@@ -57,6 +60,12 @@ class Step:
     limit: float = math.inf
     suitable: float = MAX_STEP
     since: float | None = None
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.size) and self.size > 0.0):
+            raise ValueError(
+                f"the integrator's step, max_step, must be positive and finite, got {self.size} s"
+            )
 
     @property
     def mode(self) -> str:
@@ -117,6 +126,9 @@ def choose_step(
         context: its context.
         max_step: the step if somebody asked for one [s].
         largest: a step is not chosen above it [s], but as a whole part of it.
+
+    Raises:
+        ValueError: a step that is not positive and finite.
     """
     values = _eigenvalues(diagram, context)
     values = values[np.abs(values) > NEUTRAL]

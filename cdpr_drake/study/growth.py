@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 from pydrake.systems.framework import Context, Diagram
 
 from cdpr_drake.diagrams import make_simulator
-from cdpr_drake.diagrams.step import choose_step
+from cdpr_drake.diagrams.step import StepWarning, choose_step
 from cdpr_drake.study.modes import DEADBEAT
 from cdpr_drake.study.sampled import OnePeriodMap, one_period_map
 from cdpr_drake.study.state_space import Array
@@ -66,6 +67,7 @@ def simulate_modes(
             it: coarser steps damp lightly damped modes by themselves.
 
     Raises:
+        ValueError: a step that is not positive and finite.
         LinearizationError: the diagram is not a sampled loop of the kind `one_period_map` takes.
     """
     period_map = one_period_map(diagram, context)
@@ -78,9 +80,10 @@ def simulate_modes(
     pose = [i for i, name in enumerate(period_map.states) if "platform/" in name][:6]
     shapes = right * size / np.abs(right[pose]).max(axis=0)
     _set_state(own, rest + shapes.real.sum(axis=1))
-    if max_step is None:
-        max_step = choose_step(diagram, own, largest=LARGEST_STEP).size
-    simulator = make_simulator(diagram, own, max_step=max_step)
+    step = choose_step(diagram, own, max_step, LARGEST_STEP)
+    if step.doubt:
+        warnings.warn(step.doubt, StepWarning, stacklevel=2)
+    simulator = make_simulator(diagram, own, max_step=step)
     simulator.Initialize()
     start, T = context.get_time(), period_map.period
     count = round(duration / T)
