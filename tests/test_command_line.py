@@ -238,7 +238,7 @@ def test_robots_lists_the_built_in_ones(capsys: pytest.CaptureFixture[str]) -> N
     for name, description in robot_names().items():
         robot = load_robot(name)
         row = next(line for line in text.splitlines() if line.startswith(f"{name} "))
-        assert f"{robot.mass:.0f}" in row.split() and str(robot.num_cables) in row.split()
+        assert f"{robot.mass:.3g}" in row.split() and str(robot.num_cables) in row.split()
         assert description in " ".join(text.split())
     assert "14.6 x 10.6 x 5.5" in text
 

@@ -153,3 +153,45 @@ def test_a_wrench_that_no_cable_can_take_has_no_margin() -> None:
     A = np.vstack([np.eye(3), np.zeros((3, 3))])
     found = feasibility_margin(A, [0.0, 0.0, 0.0, 1.0, 0.0, 0.0], 0.0, 10.0)
     assert found.margin == -np.inf and np.isnan(found.tension).all()
+
+
+def test_bounds_may_be_equal_far_off_or_each_cable_s_own() -> None:
+    seen = 0
+    for A, w, low, high in problems(200, 6):
+        k = A.shape[1]
+        draw = np.random.default_rng(k)
+        lower, upper = np.full(k, low), np.full(k, high)
+        upper[draw.integers(k)] = 100.0 * high
+        lower[draw.integers(k)] = -100.0 * high
+        fixed = int(draw.integers(k))
+        lower[fixed] = upper[fixed] = 0.5 * (low + high)
+        inside = (
+            linprog(np.zeros(k), A_eq=A, b_eq=w, bounds=np.stack([lower, upper], 1)).status == 0
+        )
+        try:
+            t = bounded_distribution(A, w, lower, upper, high)
+        except TensionError as error:
+            assert not inside and "not decided" not in str(error)
+            continue
+        assert inside and np.all(t >= lower) and np.all(t <= upper)
+        np.testing.assert_allclose(A @ t, w, atol=1e-9 * np.abs(w).max())
+        # No feasible direction leads closer: the nearest point of the set as Clarabel finds it.
+        closest = _by_clarabel(A, w, lower, upper, high)
+        assert np.linalg.norm(t - high) <= np.linalg.norm(closest - high) * (1.0 + 1e-6)
+        seen += 1
+    assert seen > 40
+    with pytest.raises(ValueError, match="finite"):
+        bounded_distribution(A, w, low, np.inf, 0.0)
+
+
+def _by_clarabel(
+    A: np.ndarray, w: np.ndarray, lower: np.ndarray, upper: np.ndarray, wish: float
+) -> np.ndarray:
+    from pydrake.solvers import ClarabelSolver, MathematicalProgram
+
+    programme, k = MathematicalProgram(), A.shape[1]
+    t = programme.NewContinuousVariables(k)
+    programme.AddLinearEqualityConstraint(A, w / wish, t)
+    programme.AddBoundingBoxConstraint(lower / wish, upper / wish, t)
+    programme.AddQuadraticErrorCost(np.eye(k), np.ones(k), t)
+    return wish * ClarabelSolver().Solve(programme).GetSolution(t)

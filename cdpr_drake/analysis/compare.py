@@ -117,8 +117,8 @@ def compare_cable_models(
     rows = []
     for item in robots:
         robot = item if isinstance(item, CableRobot) else load_robot(item)
-        pose = (poses or {}).get(robot.name)
-        pose = pose_to_compare(robot) if pose is None else pose
+        given = poses or {}
+        pose = given[robot.name] if robot.name in given else pose_to_compare(robot)
         ours = (believed or {}).get(robot.name)
         rows += [_compare(robot, ours, pose, model, move, tensions) for model in models]
     return Comparison(rows=tuple(rows))

@@ -23,7 +23,7 @@ def _list_robots(options: Namespace) -> int:
     columns = [
         Column(("robot", ""), [r.name for r in robots], to_the_left=True),
         Column(("x, y, height", "[m]"), sizes),
-        Column(("mass", "[kg]"), [f"{r.mass:.0f}" for r in robots], rank=1),
+        Column(("mass", "[kg]"), [f"{r.mass:.3g}" for r in robots], rank=1),
         Column(("cables", ""), [str(r.num_cables) for r in robots], rank=2),
     ]
     print(fitted_table(columns))

@@ -59,8 +59,7 @@ def bounded_distribution(
 ) -> Array:
     """Return t (k,), the closest to `preferred` that balance the wrench within the bounds.
 
-    Solved exactly, as a least-distance problem in the null space of the wrench matrix (Lawson and
-    Hanson, Solving Least Squares Problems, chapter 23).
+    Solved exactly, by Newton's method on the dual problem (`kernels/distribution.py`).
 
     Args:
         matrix: (n, k) wrench per unit of tension.
@@ -71,39 +70,31 @@ def bounded_distribution(
 
     Raises:
         TensionError: no tensions within the bounds balance the wrench.
+        ValueError: what is given is not finite.
     """
-    A, w = np.asarray(matrix, float), np.asarray(wrench, float)
-    low, high, wish = (_for_each(x, A.shape[1]) for x in (lower, upper, preferred))
+    from cdpr_drake.model.kernels.distribution import within_bounds
+
+    A, w = np.array(matrix, float), np.array(wrench, float)
+    k = A.shape[1]
+    low, high, wish = (np.array(_for_each(x, k)) for x in (lower, upper, preferred))
+    for what in (A, w, low, high, wish):
+        if not np.all(np.isfinite(what)):
+            raise ValueError("matrix, wrench, bounds and preferred tensions must be finite")
+    t = np.empty(k)
+    status = within_bounds(A, w, low, high, wish, np.ones(k), t)
+    if status == 0:
+        return t
+    if status == 2:
+        raise TensionError("whether tensions within the bounds balance the wrench was not decided")
     particular, null = _solutions(A, w)
-    centre = particular + null @ (null.T @ (wish - particular))
-    if np.all(centre >= low) and np.all(centre <= high):
-        return centre
     if null.shape[1] == 0:
         raise TensionError("the only tensions that balance the wrench leave their limits")
-    from scipy.optimize import nnls  # takes 0.4 s to import
-
-    scale = max(float(np.max(np.abs(centre))), float(np.max(high - low)))
-    G = np.vstack([null, -null])
-    h = np.concatenate([low - centre, centre - high]) / scale
-    # Least distance: min |y| with G y >= h, from the nonnegative least squares of [G h]^T u = e.
-    E = np.vstack([G.T, h])
-    f = np.zeros(E.shape[0])
-    f[-1] = 1.0
-    u, residual_norm = nnls(E, f)
-    residual = E @ u - f
-    if residual_norm < 1e-10:
-        worst = int(np.argmax(np.maximum(low - centre, centre - high)))
-        raise TensionError(
-            f"no tensions between {low.min():g} and {high.max():g} N balance the wrench; "
-            f"cable {worst + 1} is the furthest out ({centre[worst]:.1f} N)"
-        )
-    y = -residual[:-1] / residual[-1]
-    # Once more on the bounds that count alone: without the cancellation in the line above.
-    active = u > 1e-9 * np.max(u)
-    polished = np.linalg.lstsq(G[active], h[active], rcond=None)[0]
-    if np.all(G @ polished >= h - 1e-9):
-        y = polished
-    return np.clip(centre + null @ y * scale, low, high)
+    centre = particular + null @ (null.T @ (wish - particular))
+    worst = int(np.argmax(np.maximum(low - centre, centre - high)))
+    raise TensionError(
+        f"no tensions between {low.min():g} and {high.max():g} N balance the wrench; "
+        f"cable {worst + 1} is the furthest out ({centre[worst]:.1f} N)"
+    )
 
 
 def feasibility_margin(

@@ -41,7 +41,7 @@ def modelled_tensions(robot: CableRobot, pose: RigidTransform | ArrayLike) -> Ar
     try:
         chord = minimum_norm_within(matrix, wrench, *robot.cable.limits)
     except TensionError:
-        chord = np.linalg.lstsq(matrix, wrench, rcond=None)[0]
+        chord = np.asarray(np.linalg.lstsq(matrix, wrench, rcond=None)[0], float)
     w = robot.weight_per_metre
     H = np.maximum(chord * geometry.Bx / geometry.L, SLACK * w * geometry.Bx)
     return cable_angles(geometry.Bx, geometry.Bz, H, w, "SCMWE").T_A
