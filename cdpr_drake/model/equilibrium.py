@@ -136,6 +136,21 @@ def platform_balance(
     return CableSet(robot).balance(X_WP, length)[:3]
 
 
+def state_at(robot: CableRobot, X_WP: RigidTransform, length: Array) -> RestState:
+    """Return the state that a robot would have if it stopped at a pose, in balance or not.
+
+    Args:
+        robot: the robot.
+        X_WP: the pose.
+        length: (k,) [m] total unstrained lengths.
+
+    Raises:
+        EquilibriumError: a cable's catenary was not found.
+    """
+    unbalanced, _, out = platform_balance(robot, X_WP, length)
+    return _state(robot, X_WP, length, out, _relative(robot, unbalanced))
+
+
 def forward_kinematics(
     robot: CableRobot,
     length: ArrayLike,
