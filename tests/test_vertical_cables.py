@@ -28,6 +28,7 @@ from cdpr_drake.study import linearize, one_period_map
 from cdpr_drake.systems import PositionBasedVisualServo
 
 BOX = str(Path(__file__).parent / "outside" / "box.yaml")
+AWAY = (0.02, 0.01, -0.03, 0.04, 0.03, 0.05)  # rad, m
 OFFSETS = (1e-12, 1e-9, 1e-6, 1e-3)  # m
 NEARBY = 3e-5  # m
 DIRECTIONS = ((1.0, 0.0), (-0.6, 0.8), (0.0, -1.0))
@@ -59,7 +60,7 @@ def law_at(robot: CableRobot, model: str, pose: np.ndarray) -> np.ndarray:
     """Return the motor rates towards a goal elsewhere, all measured as it is at a rest."""
     rest = rest_state(robot, pose)
     tangents = rest_model(robot, rest).tangents
-    goal = pose + [0.02, 0.01, -0.03, 0.04, 0.03, 0.05]
+    goal = pose + np.array(AWAY)
     z = np.concatenate([pose, goal, np.zeros(6), rest.tension_at_drawing_point, tangents.ravel()])
     return np.asarray(
         MotorRateLaw(robot, ServoSettings(cable_model=model))(z, 0.1)[: len(tangents)]
@@ -126,7 +127,7 @@ def test_the_model_that_knows_the_robot_has_no_coupling(
 def test_chord_tension_is_that_of_the_span_in_closed_form(lean: float) -> None:
     """Of the span's equation divided by its width, in 30 digits."""
     robot = hung("segesta-10", *CASES["segesta-10"])
-    pose = CASES["segesta-10"][1] + [0, 0, 0, lean, 0, 0]
+    pose = CASES["segesta-10"][1] + lean * np.eye(6)[3]
     rest, w = rest_state(robot, pose, "within limits"), robot.weight_per_metre
     chord = np.linalg.norm(pose[3:] + robot.attachment_points[8] - robot.drawing_points[8])
     with mp.workdps(30):
@@ -170,7 +171,7 @@ def test_derivatives_at_the_vertical(model: str, case: tuple[CableRobot, int, np
         "measured_pose": pose,
         "measured_tangents": rest_model(robot, rest).tangents.ravel(),
         "measured_tension": rest.tension_at_drawing_point,
-        "desired_pose": pose + [0.02, 0.01, -0.03, 0.04, 0.03, 0.05],
+        "desired_pose": pose + np.array(AWAY),
     }
 
     def rates(system: PositionBasedVisualServo, given: dict[str, np.ndarray]) -> np.ndarray:
@@ -206,7 +207,7 @@ def test_loops_start_there_and_pass_through(case: tuple[CableRobot, int, np.ndar
     assert np.all(np.isfinite(one_period_map(vision, rest_context(vision, pose)).matrix))
     continuous = make_vision_based_control(robot, gain=0.3, sample_time=None, ramp_time=0.0)
     assert np.all(np.isfinite(linearize(continuous, rest_context(continuous, pose)).A))
-    start, goal = (pose + [0, 0, 0, s * 0.004, s * 0.003, 0.0] for s in (-1.0, 1.0))
+    start, goal = (pose + np.array([0, 0, 0, s * 0.004, s * 0.003, 0.0]) for s in (-1.0, 1.0))
     loop = make_vision_based_control(robot, gain=2.0, noise=False)
     context = rest_context(loop, start)
     loop.GetInputPort("desired_pose").FixValue(context, goal)

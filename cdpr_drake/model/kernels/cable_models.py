@@ -337,7 +337,8 @@ def drawing_point_tension(Bx, Bz, T, w):
     V_A_z = T / L * (1.0 + coshc / shc) - turn * s * s
     V_A_z = V_A_z - half_weight * s * (1.0 + c * c * shc * coshc)
     aside = T * T * c * s / (L * T_A)
-    return T_A, aside * s + sin_A * V_A_x, sin_A * V_A_z - aside * c, T * c * c / T_A + sin_A * V_A_T
+    by_T = T * c * c / T_A + sin_A * V_A_T
+    return T_A, aside * s + sin_A * V_A_x, sin_A * V_A_z - aside * c, by_T
 
 
 @jit

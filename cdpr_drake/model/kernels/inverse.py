@@ -132,7 +132,7 @@ def unstrained_lengths(model, order, rule, pose, points, body, stiffness, limits
         load[1] += arm[0] * half
         load[5] -= half
     status = tensions(rule, D, load, weight, limits, T)
-    if status == RANK_DEFICIENT or status == INFEASIBLE:
+    if status in (RANK_DEFICIENT, INFEASIBLE):
         return status
     for i in range(k):
         if not T[i].real > 0.0:
@@ -158,9 +158,7 @@ def unstrained_lengths_jacobian(
         zc[j] = pose[j]
     for j in range(6):
         zc[j] = zc[j] + STEP * 1j
-        status = unstrained_lengths(
-            model, order, rule, zc, points, body, stiffness, limits, yc, Tc
-        )
+        status = unstrained_lengths(model, order, rule, zc, points, body, stiffness, limits, yc, Tc)
         if status != 0:
             return status
         zc[j] = pose[j]
