@@ -2,8 +2,8 @@
 
 Arguments in common: model, order: the cable model's index and the order of its series; rule: see
 below; pose (6,) [roll, pitch, yaw, x, y, z]; points, body, stiffness: as in `model.arrays`; limits
-(3,): lowest, highest, preferred chord tension [N]; out (k,) [m] and T (k,) [N]: results; jacobian
-(k, 6): of out.
+(3,): lowest, highest, preferred chord tension [N]; A (6, k): wrench matrix; load (6,): wrench to
+balance; out (k,) [m] and T (k,) [N]: results; jacobian (k, 6): of out.
 
 Statuses: 0, the number of a cable that would push, RANK_DEFICIENT, INFEASIBLE where no tensions
 within the limits hold the weight, or CORNER where tensions within them have no derivative.

@@ -136,7 +136,7 @@ def least_norm(D, b, x):
 def norm_weight(c2):
     """Return the square of what a chord tension weighs in the norm of the horizontal tensions.
 
-    That is c^2, with c the cosine of the chord's elevation, but above zero for chords near the
+    That is c2 = c^2, with c the cosine of the chord's elevation, but above zero for chords near the
     vertical (`STEEP2`), whose horizontal tension is none whatever they pull.
     """
     if c2.real < STEEP2:
@@ -147,6 +147,8 @@ def norm_weight(c2):
 @jit
 def chord_tension(T_A, cos_alpha, Bx, Bz, L, w):
     """Return the chord tension: T_A cos_alpha over the chord's cosine (eq. 16), not below w L / 20.
+
+    Bx, Bz, L: of the chord [m], horizontal, up, along it.
 
     Near the vertical, where one cosine over the other says nothing, that of the catenary with T_A.
     """
