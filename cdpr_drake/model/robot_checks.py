@@ -105,7 +105,7 @@ def value_problems(robot: CableRobot) -> Problems:
     if robot.gain is not None:
         yield from _positive(robot, "gain")
     if robot.floor is not None:
-        yield from _floor(robot, robot.floor)
+        yield from _require(robot, "floor", np.isfinite, "finite")
     for name in ("X_WF", "X_PM"):
         X: Any = getattr(robot.cameras, name)
         if not (np.all(np.isfinite(X.GetAsMatrix34())) and X.rotation().IsValid()):
@@ -162,15 +162,6 @@ def _require(robot, path: str, test, wanted: str) -> Problems:  # type: ignore[n
         row = int(np.argwhere(~good)[0][0])
         what = f"cable {row + 1}" if value.shape[0] == robot.num_cables else f"entry {row + 1}"
         yield path, f"must be {wanted}, got {value[row].tolist()!r} for {what}"
-
-
-def _floor(robot: CableRobot, floor: float) -> Problems:
-    highest = float(robot.drawing_points[:, 2].max())
-    if not math.isfinite(floor):
-        yield "floor", f"must be finite, got {floor}"
-    elif floor > highest:
-        limit = f"the highest drawing point, {highest:g} m, got {floor:g} m"
-        yield "floor", f"must not be above {limit}"
 
 
 def _twins(robot: CableRobot) -> Problems:
