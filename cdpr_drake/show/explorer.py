@@ -72,7 +72,7 @@ class Explorer:
         over = labels_html(scene.labels_of(robot, self._room))
         title = f"{robot.name} at rest"
         self._page = PageServer(
-            title, self.meshcat.port(), port, over, scene.scale_note(self._room)
+            title, self.meshcat.port(), port, over, scene.scale_note(robot, self._room)
         )
         scene.draw_surroundings(self.meshcat, robot, self._room, scene.BETWEEN_PANELS)
         scene.draw_platform(self.meshcat, "/refused", robot, self._room, REFUSED, ghost=True)

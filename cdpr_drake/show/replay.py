@@ -112,7 +112,7 @@ def write_replay(
         colours=[css(c) for c in tension_colours(np.linspace(*limits, 17), limits)],
         errors=None if goal is None else _errors(robot, record["pose"][index], goal),
         entries=[(label, css(colour)) for label, colour in entries],
-        note=scene.scale_note(room),
+        note=scene.scale_note(robot, room),
         labels=scene.labels_of(robot, room),
     )
     file = Path(path)

@@ -132,16 +132,18 @@ def labels_of(robot: CableRobot, room: Room) -> list[list[Label]]:
     ]
 
 
-def scale_note(room: Room) -> str:
+def scale_note(robot: CableRobot, room: Room) -> str:
     """Return in words what the drawing's scale is, for a legend.
 
     Args:
-        room: the robot's.
+        robot: the robot.
+        room: it stands in.
     """
-    return (
-        f"Grid of {significant(grid_step(room))} m, axes of W. Cables and frame are drawn thicker "
-        "than they are, a platform too small to be seen in a ball."
-    )
+    step = significant(grid_step(room))
+    note = f"Grid of {step} m, axes of W. Cables and frame are drawn thicker than they are."
+    if np.ptp(robot.attachment_points, axis=0).max() < LEAST * room.size:
+        note += " The ball stands for a platform too small to be seen."
+    return note
 
 
 def place_viewer(meshcat: Meshcat, robot: CableRobot, room: Room, window: Window) -> None:
