@@ -68,9 +68,15 @@ class Answers:
         ]
 
     def out_of_limits(self) -> list[int]:
-        """Return the cables, counted from 1, with tensions outside of the robot's limits."""
-        cable = self.rest.robot.cable
-        outside = (self.tension < cable.min_tension) | (self.tension > cable.max_tension)
+        """Return the cables, counted from 1, with tensions outside of the robot's limits.
+
+        Those are of tensions along the chord, from which that at the drawing point differs by up to
+        half of the cable's weight.
+        """
+        cable, weight = self.rest.robot.cable, self.rest.robot.weight_per_metre
+        half = 0.5 * weight * self.rest.rest.unstrained_length
+        outside = self.tension < cable.min_tension - half
+        outside |= self.tension > cable.max_tension + half
         return [int(i) + 1 for i in np.flatnonzero(outside)]
 
 
@@ -129,6 +135,8 @@ def explore_pose(
         reason = f"{error.quantity} {error.message}"
     except CdprError as error:
         reason = str(error)
+    except np.linalg.LinAlgError as error:
+        reason = f"its linear model there has no modes: {error}"
     return Snapshot(
         robot=robot, pose=X_WP, cable_model=cable_model, gain=gain, answers=answers, reason=reason
     )

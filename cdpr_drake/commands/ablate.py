@@ -12,6 +12,7 @@ from cdpr_drake.commands.files import write_answer
 from cdpr_drake.commands.resolve import gain_in_words, gain_values, input_refused
 from cdpr_drake.commands.results import UNITS
 from cdpr_drake.commands.terminal import CaseProgress, Column, fitted_table, wrapped
+from cdpr_drake.model.digits import decimals
 
 if TYPE_CHECKING:
     from cdpr_drake.batch.ablation import Ablation, Statistic, Worth
@@ -60,7 +61,7 @@ def _ablate(options: Namespace) -> int:
         f"ablate-{'-'.join(ablation.robot for ablation in found)}",
         _summary(options, found),
         list(_lines(found)),
-        lambda show: {"sensors": show.ablation_figure(found)},
+        lambda show: {"sensors": lambda: show.ablation_figure(found)},
     )
 
 
@@ -104,14 +105,16 @@ def _columns(ablation: Ablation) -> list[Column]:
         return [_cell(row.statistics[metric], digits, with_deviation) for row in ablation.rows]
 
     labels = [row.sensors.label for row in ablation.rows]
+    highest = [row.statistics["highest_tension"].mean for row in ablation.rows]
+    newtons = decimals(max((value for value in highest if value is not None), default=0.0))
     return [
         Column(("", "sensors"), labels, to_the_left=True),
         Column(("error", "mm"), cells("position_error", 1, True)),
         Column(("", "deg"), cells("orientation_error", 3, True)),
         Column(("to 2 %", "s"), cells("settled_after", 1)),
         Column(("strays", "mm"), cells("position_excursion", 1), rank=2),
-        Column(("lowest", "N"), cells("lowest_tension", 0), rank=1),
-        Column(("highest", "N"), cells("highest_tension", 0), rank=3),
+        Column(("lowest", "N"), cells("lowest_tension", newtons), rank=1),
+        Column(("highest", "N"), cells("highest_tension", newtons), rank=3),
     ]
 
 

@@ -50,7 +50,7 @@ def _calibrate(options: Namespace) -> int:
         f"calibrate-{robot.name}",
         _summary(found, pose_errors),
         [fitted_table(_columns(found)), "", *meaning],
-        lambda show: {"calibration": show.calibration_figure(found)},
+        lambda show: {"calibration": lambda: show.calibration_figure(found)},
         {f"{as_file_name(robot.name)}-calibrated.yaml": found.robot.to_yaml()},
     )
 

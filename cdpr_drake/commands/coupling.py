@@ -19,6 +19,7 @@ from cdpr_drake.commands.resolve import (
     resolve_rule,
 )
 from cdpr_drake.commands.terminal import Column, counted, fitting, table, width_of, wrapped
+from cdpr_drake.model.digits import significant
 
 if TYPE_CHECKING:
     from cdpr_drake.analysis import Comparison, DefaultGain, ModelComparison
@@ -62,7 +63,9 @@ def _compare_models(options: Namespace) -> int:
         f"coupling-{names if options.robot else 'sizes'}",
         summary,
         lines,
-        lambda show: {"rates_and_responses": show.rates_and_responses_figure(comparison, gain)},
+        lambda show: {
+            "rates_and_responses": lambda: show.rates_and_responses_figure(comparison, gain)
+        },
     )
 
 
@@ -137,7 +140,7 @@ def _columns(comparison: Comparison) -> list[Column]:
     # fmt: off
     return [
         Column(("robot", ""), [r.robot for r in rows], to_the_left=True),
-        Column(("size", "m"), [f"{r.size:.0f}" for r in rows], rank=3),
+        Column(("size", "m"), [significant(r.size, 2) for r in rows], rank=3),
         Column(("model", ""), [r.cable_model for r in rows], to_the_left=True),
         Column(("slowest", "/ lambda"), [f"{r.slowest:.4f}" for r in rows],
                meaning="Slowest, fastest: rates of convergence over lambda, the eigenvalues of "

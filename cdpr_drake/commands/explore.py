@@ -4,18 +4,32 @@ from __future__ import annotations
 
 import math
 from argparse import ArgumentParser, Namespace
+from typing import TYPE_CHECKING
 
 from cdpr_drake.commands import Command, UsageError
 from cdpr_drake.commands import arguments as common
-from cdpr_drake.commands.resolve import gain_in_words, input_refused, resolve_gain, resolve_place
+from cdpr_drake.commands.resolve import (
+    Place,
+    gain_in_words,
+    input_refused,
+    resolve_gain,
+    resolve_place,
+    resolve_robot,
+)
 from cdpr_drake.commands.terminal import print_wrapped
+
+if TYPE_CHECKING:
+    from cdpr_drake.analysis import DefaultGain
+
+COMMON_GAIN = 0.1
+"""lambda [1/s] to begin with where the robot cannot rest."""
 
 PORTS = (1024, 65534)
 """From the first to the last that may be asked for: the next one has to be there too."""
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
-    common.add_place(parser)
+    common.add_place(parser).add_argument("--tensions", **common.TENSIONS)
     how = parser.add_argument_group("how it is controlled")
     how.add_argument("--cable-model", **common.CABLE_MODEL)
     how.add_argument("--gain", **common.GAIN)
@@ -38,10 +52,11 @@ def _explore(options: Namespace) -> int:
         raise UsageError(f"--idle: must be 0 or more and finite, got {options.idle:g} s")
     try:
         with input_refused():
-            place = resolve_place(options)
-            cameras = place.robot.cameras
-            gain, chosen = resolve_gain(options, place, cameras.sample_time, cameras.latency)
-            explorer = Explorer(place.robot, place.pose, options.cable_model, gain, options.port)
+            place = _place(options)
+            gain, chosen = _gain(options, place)
+            explorer = Explorer(
+                place.robot, place.pose, options.cable_model, gain, options.port, place.tensions
+            )
     except (OSError, RuntimeError) as error:
         raise UsageError(f"--port {options.port}: {error}") from error
     try:
@@ -57,6 +72,30 @@ def _explore(options: Namespace) -> int:
         explorer.close()
     print(f"Ended: {reason}.")
     return 0
+
+
+def _place(options: Namespace) -> Place:
+    """Return the robot where `resolve_place` has it, or in the middle of its room."""
+    from cdpr_drake.errors import GeometryError, TensionError
+    from cdpr_drake.model.room import home_position
+
+    try:
+        return resolve_place(options)
+    except (GeometryError, TensionError):  # it can nowhere be held: the page tells why
+        x, y, z = home_position(resolve_robot(options.robot)).tolist()
+        options.pose = [0.0, 0.0, 0.0, x, y, z]
+        return resolve_place(options)._replace(where="in the middle of its room")
+
+
+def _gain(options: Namespace, place: Place) -> tuple[float, DefaultGain | None]:
+    """Return the gain to begin with, and why; a common one where the robot cannot rest."""
+    from cdpr_drake.errors import CdprError
+
+    cameras = place.robot.cameras
+    try:
+        return resolve_gain(options, place, cameras.sample_time, cameras.latency)
+    except CdprError:
+        return COMMON_GAIN, None
 
 
 COMMAND = Command(

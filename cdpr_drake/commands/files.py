@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from cdpr_drake.diagrams import Record
 
-Figures = Callable[[ModuleType], Mapping[str, "Figure"]]
+Figures = Callable[[ModuleType], Mapping[str, Callable[[], "Figure"]]]
 
 DOTS_PER_INCH = 100
 SUMMARY = "summary.json"
@@ -113,7 +113,7 @@ def write_answer(
         name: of the directory, if the options do not say.
         summary: plain values; gains "cdpr_drake", "drake" and "files".
         lines: of the answer.
-        figures: makes them with `cdpr_drake.show`, by the names of their files without ".png".
+        figures: what makes each with `cdpr_drake.show`, by the names of their files without ".png".
         texts: other files, by their names.
 
     Raises:
@@ -123,16 +123,10 @@ def write_answer(
     summary = {**summary, "cdpr_drake": __version__, "drake": version("drake"), "files": [SUMMARY]}
     try:
         with staged(directory) as folder:
-            if not options.no_figures:
-                from cdpr_drake import show
-
-                for file, figure in figures(show).items():
-                    figure.savefig(folder / f"{file}.png", dpi=DOTS_PER_INCH)
-                    summary["files"].append(f"{file}.png")
             for file, text in (texts or {}).items():
                 (folder / file).write_text(text, encoding="utf-8")
-                summary["files"].append(file)
-            (folder / SUMMARY).write_text(f"{to_json(summary)}\n", encoding="utf-8")
+            drawings = {} if options.no_figures else as_drawings(figures)
+            write_summary(folder, summary, drawings)
     except OSError as error:
         raise UsageError(f"--output {directory}: {error.strerror or error}") from error
     if options.json:
@@ -142,6 +136,48 @@ def write_answer(
         print(line)
     print_wrapped(f"In {directory}: {', '.join(summary['files'])}", indent="    ")
     return 0
+
+
+Drawing = Callable[[Path], object]
+"""Draws something into the file at a path."""
+
+
+def as_drawings(figures: Figures) -> dict[str, Drawing]:
+    """Return what draws `figures`, by the names of their files."""
+    from cdpr_drake import show
+
+    def drawing(make: Callable[[], Figure]) -> Drawing:
+        return lambda path: make().savefig(path, dpi=DOTS_PER_INCH)
+
+    return {f"{name}.png": drawing(make) for name, make in figures(show).items()}
+
+
+def write_summary(folder: Path, summary: dict[str, Any], drawings: Mapping[str, Drawing]) -> None:
+    """Write the summary beside the results in a folder, then what is drawn of them.
+
+    No drawing costs a result: one that fails leaves no file, but a warning on stderr and its reason
+    in the summary.
+
+    Args:
+        folder: with the results.
+        summary: plain values; gains "files", their names, and "not_drawn", reasons by name.
+        drawings: by the names of their files.
+    """
+    results = sorted(file.name for file in folder.iterdir())
+    drawn: list[str] = []
+    summary |= {"files": [SUMMARY, *results], "not_drawn": {}}
+    (folder / SUMMARY).write_text(f"{to_json(summary)}\n", encoding="utf-8")
+    for name, draw in drawings.items():
+        try:
+            draw(folder / name)
+            drawn.append(name)
+        except Exception as error:
+            (folder / name).unlink(missing_ok=True)
+            reason = " ".join(str(error).split()) or type(error).__name__
+            print_message(f"warning: {name} is not drawn: {reason}")
+            summary["not_drawn"][name] = reason
+    summary["files"] = [SUMMARY, *sorted([*results, *drawn])]
+    (folder / SUMMARY).write_text(f"{to_json(summary)}\n", encoding="utf-8")
 
 
 def as_file_name(text: str) -> str:

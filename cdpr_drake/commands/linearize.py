@@ -61,9 +61,10 @@ def _linearize(options: Namespace) -> int:
     }
 
     def figures(show: Any) -> dict[str, Any]:
-        drawn = {"poles": show.pole_figure({timing: found}, head)}
+        drawn = {"poles": lambda: show.pole_figure({timing: found}, head)}
         if (swing := least_damped(found)) is not None:
-            drawn["mode_shape"] = show.mode_shape_figure(found, swing, place.robot, place.pose)
+            shape = found, swing, place.robot, place.pose
+            drawn["mode_shape"] = lambda: show.mode_shape_figure(*shape)
         return drawn
 
     lines = [*wrapped(head), "", str(found), "", *wrapped(_verdict(found))]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from cdpr_drake import __version__
 from cdpr_drake.commands.resolve import pose_values
 from cdpr_drake.commands.terminal import Column, fitting, print_wrapped, table, width_of
+from cdpr_drake.model.digits import significant
 
 if TYPE_CHECKING:
     from cdpr_drake.runs import Run, Setup
@@ -128,7 +129,8 @@ def _columns(runs: Sequence[Run]) -> list[Column]:
                meaning="Strays: farthest from the straight way to the goal."),
         Column(("", "deg"), cells("orientation_excursion", 2), rank=3),
         Column(("tension", "N"),
-               [f"{s.lowest_tension:.0f}-{s.highest_tension:.0f}" for s in results], rank=2,
+               ["-".join(map(significant, (s.lowest_tension, s.highest_tension))) for s in results],
+               rank=2,
                meaning="Tension: lowest and highest at the drawing points."),
     ]
     # fmt: on

@@ -6,6 +6,7 @@ from argparse import Namespace
 
 from cdpr_drake.commands import Command
 from cdpr_drake.commands.terminal import Column, fitted_table, print_wrapped
+from cdpr_drake.model.digits import significant
 
 
 def _list_robots(options: Namespace) -> int:
@@ -13,17 +14,18 @@ def _list_robots(options: Namespace) -> int:
     import numpy as np
 
     from cdpr_drake.model.robot import load_robot, robot_names
+    from cdpr_drake.model.room import floor_height
 
     robots = [load_robot(name) for name in robot_names()]
     sizes = []
     for robot in robots:
         points = robot.drawing_points
-        spans = [*np.ptp(points[:, :2], axis=0), points[:, 2].max()]
-        sizes.append(" x ".join(f"{span:.1f}" for span in spans))
+        spans = [*np.ptp(points[:, :2], axis=0), points[:, 2].max() - floor_height(robot)]
+        sizes.append(" x ".join(significant(span) for span in spans))
     columns = [
         Column(("robot", ""), [r.name for r in robots], to_the_left=True),
         Column(("x, y, height", "[m]"), sizes),
-        Column(("mass", "[kg]"), [f"{r.mass:.3g}" for r in robots], rank=1),
+        Column(("mass", "[kg]"), [significant(r.mass) for r in robots], rank=1),
         Column(("cables", ""), [str(r.num_cables) for r in robots], rank=2),
     ]
     print(fitted_table(columns))

@@ -13,7 +13,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cdpr_drake.commands import Command, UsageError
 from cdpr_drake.commands import arguments as common
-from cdpr_drake.commands.files import SUMMARY, as_file_name, staged, to_json, write_log
+from cdpr_drake.commands.files import (
+    Drawing,
+    as_drawings,
+    as_file_name,
+    staged,
+    to_json,
+    write_log,
+    write_summary,
+)
 from cdpr_drake.commands.resolve import (
     Move,
     gain_in_words,
@@ -23,6 +31,7 @@ from cdpr_drake.commands.resolve import (
 )
 from cdpr_drake.commands.results import print_results, summarize
 from cdpr_drake.commands.terminal import Progress, print_message, print_wrapped
+from cdpr_drake.model.digits import significant
 
 if TYPE_CHECKING:
     from cdpr_drake.analysis import DefaultGain
@@ -264,9 +273,8 @@ def _warn_of_low_tensions(ready: Sequence[Prepared]) -> None:
         limit = prepared.setup.robot.cable.min_tension
         # Tensions at the limit itself differ from it by what the cable weighs.
         if tension[cable] < 0.99 * limit:
-            text = (
-                f"with cable {cable + 1} at {tension[cable]:.0f} N, below the robot's {limit:g} N"
-            )
+            least = significant(tension[cable])
+            text = f"with cable {cable + 1} at {least} N, below the robot's {limit:g} N"
             said.setdefault(text, []).append(prepared.setup.label)
     for text, labels in said.items():
         print_message(f"warning: {', '.join(labels)}: starts {text}")
@@ -345,27 +353,29 @@ def _carry_out(ready: Sequence[Prepared]) -> list[Run]:
 def _write_all(
     folder: Path, summary: dict[str, Any], runs: Sequence[Run], options: Namespace
 ) -> None:
-    """Write logs, figures, replay and summary, and list the files in the summary."""
+    """Write logs and summary, then figures and replay."""
+    for r in runs:
+        write_log(folder / f"{r.setup.label.lower().replace(' ', '-')}.csv", r.record)
+    write_summary(folder, summary, _drawings(runs, options))
+
+
+def _drawings(runs: Sequence[Run], options: Namespace) -> dict[str, Drawing]:
+    """Return what draws figures and replay, by the names of their files."""
     first = runs[0].setup
     records = {r.setup.label: r.record for r in runs}
-    for label, record in records.items():
-        write_log(folder / f"{label.lower().replace(' ', '-')}.csv", record)
+    drawings: dict[str, Drawing] = {}
     if not options.no_figures:
-        from cdpr_drake.show.plots import save_figures
+        from cdpr_drake.show.plots import run_figures
 
-        save_figures(records, first.robot, folder, gain=first.gain, goal=first.goal)
+        drawings |= as_drawings(
+            lambda _: run_figures(records, first.robot, gain=first.gain, goal=first.goal)
+        )
     if not options.no_replay:
         logging.getLogger("drake").setLevel(logging.WARNING)  # Meshcat tells its address
         from cdpr_drake.show.replay import write_replay
 
         label, *others = records
-        write_replay(
-            folder / "replay.html",
-            first.robot,
-            records[label],
-            first.goal,
-            others={other: records[other] for other in others},
-            title=label,
-        )
-    summary["files"] = [SUMMARY, *sorted(file.name for file in folder.iterdir())]
-    (folder / SUMMARY).write_text(f"{to_json(summary)}\n", encoding="utf-8")
+        ghosts = {other: records[other] for other in others}
+        run = first.robot, records[label], first.goal
+        drawings["replay.html"] = lambda path: write_replay(path, *run, others=ghosts, title=label)
+    return drawings

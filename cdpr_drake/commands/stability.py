@@ -72,7 +72,9 @@ def _find_limit(options: Namespace) -> int:
         lines += ["", *_table(found)]
 
     def figures(show: Any) -> dict[str, Any]:
-        return {} if found is None else {"stability": show.stability_figure(found, title=head)}
+        if found is None:
+            return {}
+        return {"stability": lambda: show.stability_figure(found, title=head)}
 
     return write_answer(options, f"stability-{robot.name}", summary, lines, figures)
 

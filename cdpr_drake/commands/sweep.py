@@ -16,6 +16,7 @@ from cdpr_drake.commands.files import as_file_name, write_answer
 from cdpr_drake.commands.resolve import gain_in_words, input_refused
 from cdpr_drake.commands.results import UNITS
 from cdpr_drake.commands.terminal import CaseProgress, Column, fitted_table, print_message, wrapped
+from cdpr_drake.model.digits import significant
 
 if TYPE_CHECKING:
     import numpy as np
@@ -101,7 +102,7 @@ def _sweep(options: Namespace) -> int:
     def figures(show: Any) -> dict[str, Any]:
         from cdpr_drake.show.sweep_plots import sweep_figure
 
-        return {"sweep": sweep_figure(found)} if len(found.errors) < len(found) else {}
+        return {"sweep": lambda: sweep_figure(found)} if len(found.errors) < len(found) else {}
 
     summary = _summary(options, base, spread, found) | {"step": _steps(found, first.step)}
     if chosen is not None:
@@ -247,7 +248,7 @@ def _table(metrics: dict[str, np.ndarray]) -> list[Column]:
     numbers = [
         Column(
             ("", heading),
-            [_digits(values[i]) if values else "-" for values in statistics.values()],
+            [significant(values[i]) if values else "-" for values in statistics.values()],
             rank=rank,
         )
         for i, (heading, rank) in enumerate((("5 %", 1), ("50 %", 0), ("95 %", 0), ("highest", 2)))
@@ -258,10 +259,6 @@ def _table(metrics: dict[str, np.ndarray]) -> list[Column]:
         Column(("", ""), [UNITS[name] for name in metrics], to_the_left=True),
         *numbers,
     ]
-
-
-def _digits(value: float) -> str:
-    return f"{value:.3g}" if abs(value) < 1000.0 else f"{value:.0f}"
 
 
 def _cost(found: Sweep) -> str:

@@ -63,7 +63,7 @@ def make_camera_scene(robot: CableRobot) -> tuple[SceneGraph, SourceId, FrameId]
     """Return a scene to be rendered, the source of its one moving frame, and that frame, P.
 
     Args:
-        robot: the robot, for its patterns, and its drawing points for the size of the hall.
+        robot: the robot, for its patterns, and its room for the hall.
     """
     scene = SceneGraph()
     lights = [
@@ -74,7 +74,7 @@ def make_camera_scene(robot: CableRobot) -> tuple[SceneGraph, SourceId, FrameId]
     scene.AddRenderer(RENDERER, MakeRenderEngineVtk(parameters))
     source = scene.RegisterSource("pose_cameras")
     frame = scene.RegisterFrame(source, GeometryFrame("platform"))
-    for name, shape, X_WS, colour in hall_parts(robot.drawing_points):
+    for name, shape, X_WS, colour in hall_parts(robot):
         _add(scene, source, name, shape, X_WS, _look(Rgba(*colour)))
     _add_platform(scene, source, frame, robot)
     return scene, source, frame

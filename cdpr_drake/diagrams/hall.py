@@ -8,6 +8,8 @@ import numpy as np
 from pydrake.geometry import Box, Shape
 from pydrake.math import RigidTransform, RotationMatrix
 
+from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.room import room_of
 from cdpr_drake.model.rotations import Array
 
 Part = tuple[str, Shape, RigidTransform, tuple[float, float, float]]
@@ -21,17 +23,26 @@ SLAB = 12
 """Slabs of the floor along the longer side of the hall."""
 
 
-def hall_parts(drawing_points: Array) -> Iterator[Part]:
-    """Yield the parts of a hall that fits a robot.
+def hall_parts(robot: CableRobot) -> Iterator[Part]:
+    """Yield the parts of a hall that fits a robot and stands on its floor.
 
     Args:
-        drawing_points: (k, 3) [m], of the robot.
+        robot: the robot.
     """
+    floor = room_of(robot).floor
+    for name, shape, X_HS, colour in _parts(robot.drawing_points - [0.0, 0.0, floor]):
+        yield name, shape, RigidTransform([0.0, 0.0, floor]) @ X_HS, colour
+
+
+def _parts(drawing_points: Array) -> Iterator[Part]:
+    """Yield the parts of a hall with its floor at z = 0."""
     low, high = drawing_points.min(axis=0), drawing_points.max(axis=0)
     middle, size = 0.5 * (low + high), high - low
+    # A robot all in a plane, or in a line, has a hall of some width too.
+    size = np.maximum(size, 0.1 * max(float(size.max()), float(high[2]), 1e-3))
     x, y = middle[:2]
     width, depth = 1.5 * size[:2] + 0.3 * size[:2].max()
-    height = 1.6 * high[2]
+    height = 1.6 * max(float(high[2]), 0.2 * float(size[:2].max()))
     unit = 0.01 * float(np.hypot(size[0], size[1]))  # what is thin in so large a hall
     yield "floor", Box(width, depth, unit), _at(x, y, -unit), FLOOR
     yield from _joints(x, y, width, depth, unit)
@@ -80,8 +91,9 @@ def _frame(drawing_points: Array, middle: Array, side: float) -> Iterator[Part]:
         p = drawing_points[group].mean(axis=0)
         out = p[:2] - middle[:2]
         p[:2] += 1.5 * side * out / max(float(np.linalg.norm(out)), 1e-9)
-        yield f"post_{i}", Box(side, side, p[2]), _at(p[0], p[1], 0.5 * p[2]), STEEL
         tops.append(p)
+        if p[2] > side:  # else the floor carries it
+            yield f"post_{i}", Box(side, side, p[2]), _at(p[0], p[1], 0.5 * p[2]), STEEL
     for i, (a, b) in enumerate(zip(tops, [*tops[1:], tops[0]], strict=True)):
         length = float(np.hypot(*(b - a)[:2]))
         turn = RotationMatrix.MakeZRotation(float(np.arctan2((b - a)[1], (b - a)[0])))

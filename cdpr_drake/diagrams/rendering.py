@@ -21,12 +21,13 @@ from pydrake.systems.sensors import CameraInfo, RgbdSensor
 from cdpr_drake.diagrams.camera_scene import RENDERER, make_camera_scene
 from cdpr_drake.errors import RenderingError
 from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.room import room_of
 from cdpr_drake.model.vision.lens import Pinhole
 from cdpr_drake.systems.lens import LensDistortion
 from cdpr_drake.systems.pose_in_scene import PoseInScene
 
 NEAREST, FARTHEST = 0.5, 500.0
-"""Limits of what is rendered [m]."""
+"""Limits of what is rendered [m]; a small robot has a nearer one, a large robot a farther one."""
 
 # What draws without a display ends the process with a segmentation fault where it has no driver.
 _RENDER_ONE_IMAGE = """
@@ -79,6 +80,7 @@ def make_pose_camera_images(robot: CableRobot) -> Diagram:
     if not rendering_available():
         raise RenderingError("Drake cannot render without a display here: EGL finds no driver")
     builder = DiagramBuilder()
+    size = room_of(robot).size
     scene, source, frame = make_camera_scene(robot)
     builder.AddNamedSystem("scene_graph", scene)
     poses = builder.AddNamedSystem("pose_in_scene", PoseInScene(frame))
@@ -87,7 +89,7 @@ def make_pose_camera_images(robot: CableRobot) -> Diagram:
     for number, camera in enumerate(robot.cameras.pose_cameras, 1):
         lens = builder.AddNamedSystem(f"lens_{number}", LensDistortion(camera.intrinsics))
         X_WC = robot.cameras.X_WF @ camera.X_FC
-        sensor = builder.AddNamedSystem(f"camera_{number}", _sensor(X_WC, lens.lens.pinhole))
+        sensor = builder.AddNamedSystem(f"camera_{number}", _sensor(X_WC, lens.lens.pinhole, size))
         builder.Connect(scene.get_query_output_port(), sensor.query_object_input_port())
         builder.Connect(sensor.color_image_output_port(), lens.GetInputPort("pinhole_image"))
         builder.ExportInput(lens.GetInputPort("noise"), f"noise_{number}")
@@ -97,8 +99,8 @@ def make_pose_camera_images(robot: CableRobot) -> Diagram:
     return diagram
 
 
-def _sensor(X_WC: RigidTransform, pinhole: Pinhole) -> RgbdSensor:
-    """Return Drake's sensor for a pinhole.
+def _sensor(X_WC: RigidTransform, pinhole: Pinhole, size: float) -> RgbdSensor:
+    """Return Drake's sensor for a pinhole, at a robot of a size [m].
 
     OpenCV counts from the centre of the first pixel, RenderEngineVtk from its corner: half a pixel.
     """
@@ -111,7 +113,8 @@ def _sensor(X_WC: RigidTransform, pinhole: Pinhole) -> RgbdSensor:
         center_x=x + 0.5,
         center_y=y + 0.5,
     )
-    core = RenderCameraCore(RENDERER, info, ClippingRange(NEAREST, FARTHEST), RigidTransform())
-    depth = DepthRenderCamera(core, DepthRange(NEAREST, 60.0))  # never asked for
+    nearest, farthest = min(NEAREST, 0.05 * size), max(FARTHEST, 10.0 * size)
+    core = RenderCameraCore(RENDERER, info, ClippingRange(nearest, farthest), RigidTransform())
+    depth = DepthRenderCamera(core, DepthRange(nearest, 60.0))  # never asked for
     world = SceneGraph.world_frame_id()
     return RgbdSensor(world, X_WC, color_camera=ColorRenderCamera(core), depth_camera=depth)

@@ -257,6 +257,8 @@ class CableRobot(Record):
         load_cells: the load cells.
         gain: lambda [1/s] of its control law where nobody asks for another; if None, what
             `analysis.default_gain` finds.
+        floor: height of the floor in W [m], for drawings and rendered images; if None, what
+            `model.room.floor_height` takes for it.
         sources: where the values come from, by field (`cable.section`) or group (`cable`).
         assumptions: what is assumed rather than known.
 
@@ -276,6 +278,7 @@ class CableRobot(Record):
     cameras: Cameras
     load_cells: LoadCells
     gain: float | None = None
+    floor: float | None = None
     sources: dict[str, str] = field(default_factory=dict)
     assumptions: tuple[str, ...] = ()
 

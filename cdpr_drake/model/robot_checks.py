@@ -104,6 +104,8 @@ def value_problems(robot: CableRobot) -> Problems:
         yield from _require(robot, path, lambda v: np.isfinite(v) & (v >= 0), ">= 0 and finite")
     if robot.gain is not None:
         yield from _positive(robot, "gain")
+    if robot.floor is not None:
+        yield from _require(robot, "floor", np.isfinite, "finite")
     for name in ("X_WF", "X_PM"):
         X: Any = getattr(robot.cameras, name)
         if not (np.all(np.isfinite(X.GetAsMatrix34())) and X.rotation().IsValid()):

@@ -37,11 +37,13 @@ def calibration_figure(calibration: Calibration) -> Figure:
     Args:
         calibration: the calibration.
     """
-    figure = _figure(11.0, 13.0)
-    panels = figure.subplots(len(PANELS), 1)
     groups = {group.name: group for group in calibration.groups}
-    for axes, (title, names) in zip(panels, PANELS, strict=True):
-        _draw(axes, title, [groups[name] for name in names if name in groups])
+    shown = [(title, [groups[n] for n in names if n in groups]) for title, names in PANELS]
+    shown = [(title, there) for title, there in shown if there]
+    figure = _figure(11.0, 2.6 * len(shown))
+    panels = figure.subplots(len(shown), 1, squeeze=False)[:, 0]
+    for axes, (title, there) in zip(panels, shown, strict=True):
+        _draw(axes, title, there)
     _legend_below(figure, panels[0])
     return figure
 

@@ -14,6 +14,7 @@ from http.client import HTTPConnection
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 from cdpr_drake.analysis.explore import Answers, Snapshot
+from cdpr_drake.model.digits import significant
 from cdpr_drake.show.cables import css, tension_colours
 
 HOST = "127.0.0.1"
@@ -32,6 +33,8 @@ _STYLE = """
 #panel .alarm { margin-top: 8px; padding: 6px 8px; background: #fde8e4; color: #9c1c00; }
 #panel .track { width: 122px; height: 9px; background: #e6e8ec; }
 #panel .bar { height: 9px; }
+#note { position: fixed; left: 14px; bottom: 10px; pointer-events: none; color: #4a5565;
+  font: 11px/1.35 system-ui, "Segoe UI", "Liberation Sans", sans-serif; }
 </style>
 <div id="panel"></div>
 """
@@ -63,13 +66,14 @@ _SOCKET = "url = location.toString()"
 """How Meshcat's page begins to make the address of its connection."""
 
 
-def explore_page(page: str, title: str, meshcat_port: int) -> str:
+def explore_page(page: str, title: str, meshcat_port: int, over: str = "") -> str:
     """Return Meshcat's page with the panel over it, to be served from another port.
 
     Args:
         page: Meshcat's own.
         title: of the page.
         meshcat_port: where Meshcat is.
+        over: more HTML to be over it.
 
     Raises:
         ValueError: the page is not as expected.
@@ -82,7 +86,7 @@ def explore_page(page: str, title: str, meshcat_port: int) -> str:
     start = start.replace("<head>", f'<head><base href="{server}">', 1)
     name = html.escape(title)
     start = start.replace("<title>Drake MeshCat</title>", f"<title>{name}</title>", 1)
-    return start + _STYLE + _SCRIPT + body + end
+    return start + over + _STYLE + _SCRIPT + body + end
 
 
 class PageServer:
@@ -92,6 +96,8 @@ class PageServer:
         title: of the page.
         meshcat_port: where Meshcat is.
         port: of the page; 0 for any that is free.
+        over: HTML to be over the drawing.
+        note: a sentence on the drawing, below it.
 
     Attributes:
         panel: HTML of the panel, to be set.
@@ -101,12 +107,15 @@ class PageServer:
         ValueError: Meshcat's page is not as expected.
     """
 
-    def __init__(self, title: str, meshcat_port: int, port: int = 0) -> None:
+    def __init__(
+        self, title: str, meshcat_port: int, port: int = 0, over: str = "", note: str = ""
+    ) -> None:
         self.panel = ""
+        over += f'<div id="note">{html.escape(note)}</div>\n'
         meshcat = HTTPConnection(HOST, meshcat_port, timeout=30.0)
         with contextlib.closing(meshcat):
             meshcat.request("GET", "/")
-            page = explore_page(meshcat.getresponse().read().decode(), title, meshcat_port)
+            page = explore_page(meshcat.getresponse().read().decode(), title, meshcat_port, over)
         texts = {"/": lambda: page, "/panel": lambda: self.panel}
         self._server = ThreadingHTTPServer((HOST, port), partial(_Handler, texts))
         self._server.daemon_threads = True
@@ -161,7 +170,7 @@ def panel_html(snapshot: Snapshot, limits: tuple[float, float]) -> str:
     """
     robot = snapshot.robot
     lines = [
-        f"<h1>{html.escape(robot.name)}, {robot.mass:.0f} kg</h1>",
+        f"<h1>{html.escape(robot.name)}, {significant(robot.mass)} kg</h1>",
         f"<div>{robot.num_cables} cables, law with {html.escape(snapshot.cable_model)}, "
         f"&lambda; = {snapshot.gain:.3g}/s</div>",
     ]
@@ -208,7 +217,9 @@ def _tensions(answers: Answers, limits: tuple[float, float]) -> list[str]:
     for i, (tension, colour) in enumerate(zip(answers.tension, colours, strict=True)):
         width = 100.0 * min(max(tension / limits[1], 0.0), 1.0)
         bar = f'<div class="bar" style="width: {width:.0f}%; background: {css(colour)}"></div>'
-        rows.append((f"cable {i + 1}", f'<div class="track">{bar}</div>', f"{tension:.0f} N"))
+        rows.append(
+            (f"cable {i + 1}", f'<div class="track">{bar}</div>', f"{significant(tension)} N")
+        )
     lines = ['<div class="heading">Tensions at the drawing points</div>', _table(rows)]
     if outside := answers.out_of_limits():
         text = f"Outside of {cable.min_tension:g} to {cable.max_tension:g} N: cable "

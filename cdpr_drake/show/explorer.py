@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import math
 import time
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,11 +12,16 @@ from pydrake.geometry import Cylinder, Meshcat, MeshcatParams, Rgba
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analysis.explore import Snapshot, explore_pose
+from cdpr_drake.model.digits import round_step
+from cdpr_drake.model.kinematics import cable_ends
 from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.room import room_of
 from cdpr_drake.model.rotations import as_pose, pose_to_vector
+from cdpr_drake.model.statics import DEFAULT_RULE
 from cdpr_drake.show import scene
 from cdpr_drake.show.cables import CABLE_RADIUS, SEGMENTS, cable_shapes, linear, tension_colours
 from cdpr_drake.show.explore_page import HOST, PageServer, panel_html
+from cdpr_drake.show.labels import labels_html
 
 POSE = ("roll [deg]", "pitch [deg]", "yaw [deg]", "x [m]", "y [m]", "z [m]")
 """Names of the sliders of the pose, in the order of a pose vector."""
@@ -43,9 +47,10 @@ class Explorer:
         cable_model: of the law.
         gain: lambda [1/s] to begin with.
         port: of the page, from 1024 on; Meshcat takes the next one. 0 for any two that are free.
+        tensions: one of `model.statics.RULES`.
 
     Raises:
-        ValueError: an unknown cable model, or a gain that is not positive.
+        ValueError: an unknown cable model or rule, or a gain that is not positive.
         OSError, RuntimeError: a port is taken.
     """
 
@@ -56,16 +61,21 @@ class Explorer:
         cable_model: str = "SCMWE",
         gain: float = 0.1,
         port: int = 0,
+        tensions: str = DEFAULT_RULE,
     ) -> None:
-        self._robot, self._cable_model = robot, cable_model
+        self._robot, self._cable_model, self._tensions = robot, cable_model, tensions
         self._drawn: CableRobot | None = None
-        self.snapshot = explore_pose(robot, pose, cable_model, gain=gain)
+        X_WP = as_pose(pose)
+        self.snapshot = self._ask(X_WP, gain)
+        self._room = room_of(robot, [X_WP])
         self.meshcat = _meshcat(port + 1 if port else 0)
-        self._page = PageServer(f"{robot.name} at rest", self.meshcat.port(), port)
-        scene.draw_surroundings(self.meshcat, robot)
-        # Between the panel and the controls.
-        scene.place_viewer(self.meshcat, robot, distance=1.9, aside=0.0)
-        scene.draw_platform(self.meshcat, "/refused", robot, REFUSED, ghost=True)
+        over = labels_html(scene.labels_of(robot, self._room))
+        title = f"{robot.name} at rest"
+        self._page = PageServer(
+            title, self.meshcat.port(), port, over, scene.scale_note(robot, self._room)
+        )
+        scene.draw_surroundings(self.meshcat, robot, self._room, scene.BETWEEN_PANELS)
+        scene.draw_platform(self.meshcat, "/refused", robot, self._room, REFUSED, ghost=True)
         self._draw_bars()
         self._add_controls(pose_to_vector(as_pose(pose)), gain)
         self._values: tuple[float, ...] = ()
@@ -90,7 +100,7 @@ class Explorer:
         pose = np.array([*np.radians(values[:3]), *values[3:6]])
         if abs(values[6] - self._robot.payload.mass) > 1e-9:
             self._robot = self._robot.with_payload(values[6])
-        self.snapshot = explore_pose(self._robot, pose, self._cable_model, gain=values[7])
+        self.snapshot = self._ask(pose, values[7])
         self._draw(self.snapshot)
         return True
 
@@ -119,17 +129,24 @@ class Explorer:
         self._page.close()
         del self.meshcat
 
+    def _ask(self, pose: RigidTransform | ArrayLike, gain: float) -> Snapshot:
+        return explore_pose(
+            self._robot, pose, self._cable_model, gain=gain, tensions=self._tensions
+        )
+
     def _add_controls(self, pose: np.ndarray, gain: float) -> None:
-        low, high = _reach(self._robot)
+        fine = _fine(self._room.size / 2000.0)
+        low = fine * np.ceil(self._room.low / fine - 1e-9)
+        high = fine * np.floor(self._room.high / fine + 1e-9)
         begin = [*np.degrees(pose[:3]), *pose[3:]]
         spans = [(-TILT, TILT, 0.5), (-TILT, TILT, 0.5), (-TURN, TURN, 0.5)]
-        spans += [(low[i], high[i], 0.01) for i in range(3)]
+        spans += [(float(low[i]), float(high[i]), fine) for i in range(3)]
         # Position first: it is what one drags most.
         for i in (3, 4, 5, 0, 1, 2):
             self._add_slider(POSE[i], *spans[i], begin[i])
         mass = self._robot.payload.mass
-        most = _rounded_up(max(3.0 * self._robot.platform.mass, 2.0 * mass))
-        self._add_slider(PAYLOAD, 0.0, most, 1.0, mass)
+        most = round_step(max(3.0 * self._robot.platform.mass, 2.0 * mass))
+        self._add_slider(PAYLOAD, 0.0, most, _fine(most / 500.0), mass)
         # Meshcat rounds to steps: a small gain needs small ones, not to become another, or zero.
         step = min(0.01, 10.0 ** (math.floor(math.log10(gain)) - 1))
         self._add_slider(GAIN, step, max(5.0, gain), step, gain)
@@ -141,7 +158,7 @@ class Explorer:
 
     def _draw_bars(self) -> None:
         """Draw bars of length 1, to be placed and stretched."""
-        bar = Cylinder(CABLE_RADIUS * scene.drawing_scale(self._robot), 1.0)
+        bar = Cylinder(CABLE_RADIUS * scene.drawing_scale(self._room), 1.0)
         for cable in range(self._robot.num_cables):
             for segment in range(SEGMENTS):
                 self.meshcat.SetObject(_bar_path(cable, segment), bar, Rgba(0.5, 0.5, 0.5))
@@ -149,25 +166,33 @@ class Explorer:
     def _draw(self, snapshot: Snapshot) -> None:
         if snapshot.robot is not self._drawn:
             self.meshcat.Delete("/platform")
-            scene.draw_platform(self.meshcat, "/platform", snapshot.robot, scene.PLATFORM)
+            scene.draw_platform(
+                self.meshcat, "/platform", snapshot.robot, self._room, scene.PLATFORM
+            )
             self._drawn = snapshot.robot
         rests = snapshot.answers is not None
-        for path, visible in (("/platform", rests), ("/cables", rests), ("/refused", not rests)):
+        for path, visible in (("/platform", rests), ("/refused", not rests)):
             self.meshcat.SetProperty(path, "visible", visible)
         for path in ("/platform", "/refused"):
             self.meshcat.SetTransform(path, snapshot.pose)
         limits = (0.0, 1.0)
         if snapshot.answers is not None:
-            limits = (0.0, _rounded_up(float(snapshot.answers.tension.max())))
-            self._draw_cables(snapshot, limits)
+            limits = (0.0, round_step(float(snapshot.answers.tension.max())))
+        self._draw_cables(snapshot, limits)
         self._page.panel = panel_html(snapshot, limits)
 
     def _draw_cables(self, snapshot: Snapshot, limits: tuple[float, float]) -> None:
-        assert snapshot.answers is not None
-        rest = snapshot.answers.rest.rest
-        pose = pose_to_vector(snapshot.pose)
-        shapes = cable_shapes(snapshot.robot, pose[None], rest.unstrained_length[None])[0]
-        colours = linear(tension_colours(snapshot.answers.tension, limits))
+        """Draw the cables at rest, coloured by tension; where there is no rest, grey chords."""
+        robot = snapshot.robot
+        if snapshot.answers is None:
+            ends = cable_ends(robot, snapshot.pose)
+            along = np.linspace(0.0, 1.0, SEGMENTS + 1)[:, None]
+            shapes = ends.p_WA[:, None] + along * np.asarray(ends.chord)[:, None]
+            colours = np.full((robot.num_cables, 3), 0.5)
+        else:
+            rest, pose = snapshot.answers.rest.rest, pose_to_vector(snapshot.pose)
+            shapes = cable_shapes(robot, pose[None], rest.unstrained_length[None])[0]
+            colours = linear(tension_colours(snapshot.answers.tension, limits))
         for cable, (points, colour) in enumerate(zip(shapes, colours, strict=True)):
             for segment in range(SEGMENTS):
                 path = _bar_path(cable, segment)
@@ -192,16 +217,6 @@ def _bar_path(cable: int, segment: int) -> str:
     return f"/cables/{cable + 1}/{segment + 1}"
 
 
-def _reach(robot: CableRobot) -> tuple[Any, Any]:
-    """Return the corners (3,) of the box between the drawing points, down to the floor."""
-    low, high = robot.drawing_points.min(axis=0), robot.drawing_points.max(axis=0)
-    low[2] = min(0.0, low[2])
-    return np.ceil(10.0 * low) / 10.0, np.floor(10.0 * high) / 10.0
-
-
-def _rounded_up(value: float) -> float:
-    """Return the next of 1, 2, 5, 10, 20, ... from a value on, for the end of a scale."""
-    if value <= 0.0:
-        return 1.0
-    power = 10.0 ** math.floor(math.log10(value))
-    return next(float(m * power) for m in (1.0, 2.0, 5.0, 10.0) if m * power >= value * (1 - 1e-9))
+def _fine(step: float) -> float:
+    """Return the power of ten next below or at a step of a slider."""
+    return float(10.0 ** math.floor(math.log10(step) + 1e-9))

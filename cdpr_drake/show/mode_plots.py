@@ -17,10 +17,12 @@ from pydrake.math import RigidTransform
 from cdpr_drake.analysis.stability import StabilityMap
 from cdpr_drake.model.kinematics import cable_ends
 from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.room import room_of
 from cdpr_drake.model.rotations import as_pose, pose_to_vector, vector_to_pose
 from cdpr_drake.model.signals import POSE
 from cdpr_drake.show.plots import _figure, _legend_below, spread
-from cdpr_drake.show.style import REFERENCE, RUN_COLOURS, cable_colour
+from cdpr_drake.show.scene import LEAST
+from cdpr_drake.show.style import REFERENCE, RUN_COLOURS, cable_style
 from cdpr_drake.study.modes import Mode, Modes
 
 if TYPE_CHECKING:
@@ -303,7 +305,7 @@ def _draw_motion(axes: Any, values: np.ndarray, robot: CableRobot, X_WP: RigidTr
     """Draw the platform at rest, at the ends of its motion, and the ways of its corners."""
     B = robot.attachment_points
     low, high = B.min(axis=0), B.max(axis=0)
-    size = float(np.linalg.norm(high - low))
+    size = max(float(np.linalg.norm(high - low)), LEAST * room_of(robot).size)
     reach = np.linalg.norm(values[3:]) + 0.5 * size * np.linalg.norm(values[:3])
     scale = ENLARGED * size / reach if reach > 0.0 else 0.0
     values = values * np.exp(-1j * np.angle(values[np.argmax(np.abs(values))]))  # ends at 0 and pi
@@ -320,9 +322,9 @@ def _draw_motion(axes: Any, values: np.ndarray, robot: CableRobot, X_WP: RigidTr
                 axes.plot(*box[[i, j]].T, color=colour, linewidth=width)
     cables = cable_ends(robot, X_WP)
     for i, (rest, chord) in enumerate(zip(cables.p_WB, cables.chord, strict=True)):
-        stub = np.array([rest, rest - 0.6 * size * chord / np.linalg.norm(chord)])
-        axes.plot(*stub.T, color=cable_colour(i), linewidth=0.9)
-        axes.plot(*way[:, i].T, color=cable_colour(i), linewidth=1.4)
+        stub = np.array([rest, rest - 0.6 * size * chord / max(np.linalg.norm(chord), 1e-9)])
+        axes.plot(*stub.T, linewidth=0.9, **cable_style(i))
+        axes.plot(*way[:, i].T, linewidth=1.4, **cable_style(i))
     middle = (X_WP @ (0.5 * (low + high))).ravel()
     for name, m in zip("xyz", middle, strict=True):
         getattr(axes, f"set_{name}lim")(m - 0.75 * size, m + 0.75 * size)

@@ -9,6 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdpr_drake.model.digits import decimals
+from cdpr_drake.show.labels import Label, labels_html
+
 _STYLE = """
 <style>
 #replay { position: fixed; left: 14px; top: 14px; width: 228px; padding: 10px 14px 8px;
@@ -45,7 +48,7 @@ _SCRIPT = """
     for (const name of ["position", "angle"])
       if (data[name]) find(name).textContent = data[name][frame];
     data.tension[frame].forEach((tension, i) => {
-      find("tension" + i).textContent = tension;
+      find("tension" + i).textContent = tension.toFixed(data.digits);
       const part = Math.min(Math.max((tension - data.low) / (data.high - data.low), 0), 1);
       const bar = find("bar" + i);
       bar.style.width = 100 * Math.max(tension, 0) / data.high + "%";
@@ -88,6 +91,8 @@ class Legend:
         colours: of tensions from low to high, "#rrggbb".
         errors: (n, 2) distance to the goal [m] and angle [rad], or None without a goal.
         entries: (label, CSS colour) of what is drawn.
+        note: a sentence at the end.
+        labels: texts in the drawing, see `labels_html`.
     """
 
     title: str
@@ -100,6 +105,8 @@ class Legend:
     colours: Sequence[str]
     errors: np.ndarray | None
     entries: Sequence[tuple[str, str]]
+    note: str
+    labels: Sequence[Sequence[Label]]
 
 
 def add_legend(page: str, legend: Legend) -> str:
@@ -117,7 +124,8 @@ def add_legend(page: str, legend: Legend) -> str:
         raise ValueError("Meshcat's page has no </body>")
     name = html.escape(legend.title)
     head = head.replace("<title>Drake MeshCat</title>", f"<title>{name}</title>", 1)
-    return head + _STYLE + _card(legend) + _data(legend) + _SCRIPT + end + tail
+    added = labels_html(legend.labels) + _card(legend) + _data(legend) + _SCRIPT
+    return head + _STYLE + added + end + tail
 
 
 def _card(legend: Legend) -> str:
@@ -150,17 +158,19 @@ def _card(legend: Legend) -> str:
         f'<div><span class="swatch" style="background: {colour}"></span>{html.escape(label)}</div>'
         for label, colour in legend.entries
     ]
-    lines += ["</div>", '<div class="note">Cables and posts are drawn thicker than they are.</div>']
+    lines += ["</div>", f'<div class="note">{html.escape(legend.note)}</div>']
     return f'<div id="replay">{"".join(lines)}</div>\n'
 
 
 def _data(legend: Legend) -> str:
     low, high = legend.tension_range
+    digits = decimals(float(np.abs(legend.tension).max()))
     data: dict[str, object] = {
         "time": np.round(legend.time, 3).tolist(),
         "fps": legend.frames_per_second,
         "speed": legend.speed,
-        "tension": np.rint(legend.tension).astype(int).tolist(),
+        "tension": np.round(legend.tension, digits).tolist(),
+        "digits": digits,
         "low": low,
         "high": high,
         "colours": list(legend.colours),

@@ -23,7 +23,7 @@ from cdpr_drake.model.kinematics import cable_ends
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import as_pose, vector_to_pose
 from cdpr_drake.model.servo import pose_error
-from cdpr_drake.show.style import REFERENCE, cable_colour, run_styles
+from cdpr_drake.show.style import REFERENCE, cable_style, run_styles
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -125,7 +125,7 @@ def tension_figure(runs: Runs, robot: CableRobot) -> Figure:
     low, high = robot.cable.min_tension, robot.cable.max_tension
     in_view = high < 1.5 * top
     for axes in panels[0]:
-        axes.set_ylim(0.0, 1.08 * max(top, low, high if in_view else 0.0))
+        axes.set_ylim(0.0, 1.08 * max(top, low, high if in_view else 0.0) or 1.0)
         if in_view:
             _limit(axes, low, f"lower limit {low:g} N")
             _limit(axes, high, f"upper limit {high:g} N")
@@ -213,21 +213,42 @@ def save_figures(
         ValueError: the goal is no pose.
         OSError: a file cannot be written.
     """
-    goal = None if goal is None else as_pose(goal)
+    figures = run_figures(runs, robot, gain=gain, goal=goal)
     folder = Path(directory)
     folder.mkdir(parents=True, exist_ok=True)
-    figures = {
-        "pose_error": pose_error_figure(runs, robot, goal),
-        "error_norm": error_norm_figure(runs, gain, robot, goal),
-        "tension": tension_figure(runs, robot),
-        "sag": sag_figure(runs, robot),
-        "motor_rate": motor_rate_figure(runs),
-    }
     paths = []
-    for name, figure in figures.items():
+    for name, make in figures.items():
         paths.append(folder / f"{name}.png")
-        figure.savefig(paths[-1], dpi=DOTS_PER_INCH)
+        make().savefig(paths[-1], dpi=DOTS_PER_INCH)
     return paths
+
+
+def run_figures(
+    runs: Runs,
+    robot: CableRobot,
+    *,
+    gain: float | None = None,
+    goal: RigidTransform | ArrayLike | None = None,
+) -> dict[str, Callable[[], Figure]]:
+    """Return what makes each figure of `save_figures`, by its name.
+
+    Args:
+        runs: the runs by label.
+        robot: the robot.
+        gain: lambda [1/s] for the reference slope of `error_norm_figure`.
+        goal: from which errors are taken; see `pose_error_figure`.
+
+    Raises:
+        ValueError: the goal is no pose.
+    """
+    to = None if goal is None else as_pose(goal)
+    return {
+        "pose_error": lambda: pose_error_figure(runs, robot, to),
+        "error_norm": lambda: error_norm_figure(runs, gain, robot, to),
+        "tension": lambda: tension_figure(runs, robot),
+        "sag": lambda: sag_figure(runs, robot),
+        "motor_rate": lambda: motor_rate_figure(runs),
+    }
 
 
 def _figure(width: float, height: float) -> Any:
@@ -272,7 +293,7 @@ def _plot_cables(panels: Any, runs: Runs, values: Callable[[Record], np.ndarray]
     for axes, run in zip(panels, runs.values(), strict=True):
         for i, signal in enumerate(values(run).T):
             label = f"cable {i + 1}"
-            axes.plot(run.time, signal, linewidth=1.1, color=cable_colour(i), label=label)
+            axes.plot(run.time, signal, linewidth=1.1, label=label, **cable_style(i))
 
 
 def number_cables(axes: Axes) -> None:
@@ -368,7 +389,7 @@ def _legend_below(figure: Figure, axes: Axes) -> None:
         handles,
         labels,
         loc="outside lower center",
-        ncols=len(labels),
+        ncols=len(labels) if len(labels) <= 8 else -(-len(labels) // 2),
         frameon=False,
         handlelength=2.5,
     )

@@ -14,7 +14,9 @@ from pydrake.geometry import Cylinder, Meshcat, MeshcatAnimation, MeshcatParams,
 from pydrake.math import RigidTransform
 
 from cdpr_drake.diagrams import Record
+from cdpr_drake.model.digits import significant
 from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.room import Room, room_of
 from cdpr_drake.model.rotations import as_pose, vector_to_pose
 from cdpr_drake.model.servo import pose_error
 from cdpr_drake.show import scene
@@ -84,22 +86,24 @@ def write_replay(
     animation = MeshcatAnimation(frames_per_second)
     animation.set_loop_mode(MeshcatAnimation.LoopMode.kLoopRepeat)
     animation.set_repetitions(10_000)
-    scene.draw_surroundings(meshcat, robot)
-    entries = _add_run(meshcat, animation, robot, record, index)
+    poses = [X_WP for run in (record, *others.values()) for X_WP in _some_poses(run)]
+    room = room_of(robot, poses if goal is None else [*poses, goal])
+    scene.draw_surroundings(meshcat, robot, room, scene.BESIDE_LEGEND)
+    entries = _add_run(meshcat, animation, robot, room, record, index)
     _animate_colours(animation, tension_colours(tension, limits))
     if goal is not None:
-        scene.draw_platform(meshcat, "/goal", robot, scene.GOAL, ghost=True)
+        scene.draw_platform(meshcat, "/goal", robot, room, scene.GOAL, ghost=True)
         meshcat.SetTransform("/goal", goal)
         entries.append(("goal", scene.GOAL))
     for number, (label, other) in enumerate(others.items(), start=1):
-        colour = _add_other(meshcat, animation, robot, other, frames, number)
+        colour = _add_other(meshcat, animation, robot, room, other, frames, number)
         entries.append((label, colour))
     entries.append(("fixed camera", scene.CAMERA))
     meshcat.SetAnimation(animation)
 
     legend = Legend(
         title=title,
-        subtitle=f"{robot.name}, {robot.num_cables} cables, {robot.mass:g} kg",
+        subtitle=f"{robot.name}, {robot.num_cables} cables, {significant(robot.mass)} kg",
         time=frames,
         frames_per_second=frames_per_second,
         speed=pace,
@@ -108,6 +112,8 @@ def write_replay(
         colours=[css(c) for c in tension_colours(np.linspace(*limits, 17), limits)],
         errors=None if goal is None else _errors(robot, record["pose"][index], goal),
         entries=[(label, css(colour)) for label, colour in entries],
+        note=scene.scale_note(robot, room),
+        labels=scene.labels_of(robot, room),
     )
     file = Path(path)
     file.write_text(add_legend(meshcat.StaticHtml(), legend), encoding="utf-8")
@@ -154,6 +160,12 @@ def nearest(time: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     return right - (wanted - time[right - 1] < time[right] - wanted)
 
 
+def _some_poses(record: Record) -> list[RigidTransform]:
+    """Return X_WP at some fifty samples of a record, and at the last."""
+    poses = record["pose"]
+    return [vector_to_pose(p) for p in (*poses[:: max(1, len(poses) // 50)], poses[-1])]
+
+
 def _quiet_meshcat() -> Meshcat:
     """Return a Meshcat on a free port; nobody is to connect to it, so its address is not logged."""
     log = logging.getLogger("drake")
@@ -180,20 +192,21 @@ def _add_run(
     meshcat: Meshcat,
     animation: MeshcatAnimation,
     robot: CableRobot,
+    room: Room,
     record: Record,
     index: np.ndarray,
 ) -> list[tuple[str, Colour]]:
     """Draw and animate platform and cables at some samples; return what the legend is to say."""
     poses = record["pose"]
-    scale = scene.drawing_scale(robot)
-    scene.draw_platform(meshcat, "/run/platform", robot, scene.PLATFORM)
+    scale = scene.drawing_scale(room)
+    scene.draw_platform(meshcat, "/run/platform", robot, room, scene.PLATFORM)
     _animate_body(animation, "/run/platform", poses[index])
     scene.draw_path(meshcat, "/run/path", poses[:, 3:], PATH_RADIUS * scale, scene.PLATFORM)
     shapes = cable_shapes(robot, poses[index], record["unstrained_length"][index])
     _animate_cables(meshcat, animation, shapes, scale)
     entries: list[tuple[str, Colour]] = [("platform and its path", scene.PLATFORM)]
     if robot.payload.mass > 0.0:
-        entries.append((f"payload, {robot.payload.mass:g} kg", scene.PAYLOAD))
+        entries.append((f"payload, {significant(robot.payload.mass)} kg", scene.PAYLOAD))
     return entries
 
 
@@ -201,14 +214,15 @@ def _add_other(
     meshcat: Meshcat,
     animation: MeshcatAnimation,
     robot: CableRobot,
+    room: Room,
     record: Record,
     frames: np.ndarray,
     number: int,
 ) -> Colour:
     """Draw and animate the platform of another run as a ghost, and return its colour."""
     colour = scene.GHOSTS[(number - 1) % len(scene.GHOSTS)]
-    root, radius = f"/other{number}", PATH_RADIUS * scene.drawing_scale(robot)
-    scene.draw_platform(meshcat, f"{root}/platform", robot, colour, ghost=True, faces=False)
+    root, radius = f"/other{number}", PATH_RADIUS * scene.drawing_scale(room)
+    scene.draw_platform(meshcat, f"{root}/platform", robot, room, colour, ghost=True, faces=False)
     poses = record["pose"]
     _animate_body(animation, f"{root}/platform", poses[nearest(record.time, frames)])
     scene.draw_path(meshcat, f"{root}/path", poses[:, 3:], radius, colour)
@@ -262,9 +276,9 @@ def _errors(robot: CableRobot, poses: np.ndarray, goal: RigidTransform) -> np.nd
 
 
 def _nice_range(tension: np.ndarray) -> tuple[float, float]:
-    """Return limits of a colour scale [N], multiples of 100, of 10 or of 1."""
+    """Return limits of a colour scale [N], multiples of a power of ten that the range asks for."""
     low, high = float(tension.min()), float(tension.max())
-    step = next((s for s in (100.0, 10.0) if high - low > 2.0 * s), 1.0)
-    return step * math.floor(low / step), step * max(
-        math.ceil(high / step), math.floor(low / step) + 1
-    )
+    span = high - low if high - low > 1e-6 * abs(high) else max(abs(high), 1e-6)
+    step = 10.0 ** math.floor(math.log10(0.5 * span))
+    first, last = math.floor(low / step), math.ceil(high / step)
+    return step * first, step * max(last, first + 1)

@@ -14,6 +14,7 @@ import numpy as np
 from cdpr_drake.analysis.compare import Comparison, ModelComparison
 from cdpr_drake.analysis.gain_matrix import GainMap
 from cdpr_drake.model.cable_models import CABLE_MODELS
+from cdpr_drake.model.digits import significant
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.show.plots import _dress, _figure, _legend_below
 from cdpr_drake.show.style import REFERENCE, run_styles
@@ -59,7 +60,7 @@ def rates_and_responses_figure(
     styles = run_styles([m for m in CABLE_MODELS if m in models])
     time = np.linspace(0.0, until, 401)
     for column, rows in zip(grid.T, columns, strict=True):
-        column[0].set_title(f"{rows[0].robot}: {rows[0].size:.0f} m", fontsize=11)
+        column[0].set_title(f"{rows[0].robot}: {significant(rows[0].size, 2)} m", fontsize=11)
         _draw_rates(column[0], rows, models, styles, gain)
         _draw_turn(column[1], rows, styles, gain, time)
         _draw_excursion(column[2], rows, styles, gain, time)

@@ -37,3 +37,13 @@ def cable_colour(index: int) -> str:
         index: counting from 0.
     """
     return CABLE_COLOURS[index % len(CABLE_COLOURS)]
+
+
+def cable_style(index: int) -> dict[str, Any]:
+    """Return the colour of a cable, and dashes that tell it from others of that colour.
+
+    Args:
+        index: counting from 0.
+    """
+    dashes = RUN_DASHES[index // len(CABLE_COLOURS) % len(RUN_DASHES)]
+    return {"color": cable_colour(index), "linestyle": dashes}

@@ -7,6 +7,7 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from cdpr_drake.errors import CableError
 from cdpr_drake.model.cables import CableSet, packed_sizes
+from cdpr_drake.model.digits import significant
 from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import vector_to_pose
@@ -131,4 +132,8 @@ def raise_cable_error(
         raise CableError(cable, time, f"no catenary of unstrained length {length[cable - 1]:.6g} m")
     highest = packed[5 + cable : 6 + 2 * k : k].max()
     limit = robot.cable.breaking_load
-    raise CableError(cable, time, f"{highest:.0f} N is above the breaking load of {limit:.0f} N")
+    raise CableError(
+        cable,
+        time,
+        f"{significant(highest)} N is above the breaking load of {significant(limit)} N",
+    )
