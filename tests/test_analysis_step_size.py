@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pydrake.systems.primitives import LinearSystem
 from scipy.linalg import expm
 
@@ -14,6 +17,13 @@ from cdpr_drake.analysis import StepWarning, platform_modes, step_error, step_li
 from cdpr_drake.diagrams import make_simulator
 from cdpr_drake.diagrams.simulation import MAX_STEP
 from cdpr_drake.model.robot import CableRobot, load_robot
+from cdpr_drake.model.step_size import (
+    LARGEST_ERROR,
+    LEAST_DAMPING,
+    amplification,
+    largest_steps,
+    suitable_steps,
+)
 from cdpr_drake.runs import prepare, setup_of_test
 from cdpr_drake.study import modes
 
@@ -59,7 +69,31 @@ def test_a_run_with_coarse_steps_warns(cogiro: CableRobot) -> None:
         prepare(setup_of_test(4, max_step=0.025, **SHORT))
     stiff = cogiro.replace(winch=cogiro.winch.replace(proportional_gain=2670.0))
     with pytest.warns(StepWarning, match="of 10 ms is too coarse for a mode at 4"):
-        prepare(setup_of_test(4, stiff, **SHORT))
+        prepare(setup_of_test(4, stiff, max_step=0.01, **SHORT))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        prepare(setup_of_test(4, **SHORT))
+        for robot in (cogiro, stiff):
+            prepare(setup_of_test(4, robot, **SHORT))
+
+
+@given(
+    st.floats(1.0, 1e4),
+    st.floats(0.0, 1.0),
+    st.sampled_from([largest_steps, suitable_steps]),
+)
+def test_the_largest_step_is_the_one_of_the_error_allowed(
+    rate: float, damping: float, steps: Callable[[complex], np.ndarray]
+) -> None:
+    eigenvalue = rate * complex(-damping, np.sqrt(1.0 - damping**2))
+    allowed = LARGEST_ERROR
+    if steps is suitable_steps:
+        allowed *= max(damping, LEAST_DAMPING)
+    (step,) = steps(eigenvalue)
+    assert step_error(eigenvalue, step) == pytest.approx(allowed, rel=1e-6)
+    assert step_error(eigenvalue, 0.9 * step) < allowed < step_error(eigenvalue, 1.1 * step)
+    assert abs(amplification(step * eigenvalue)) < 1.0 + 1e-3  # far from where it is unstable
+
+
+def test_what_does_not_move_limits_no_step() -> None:
+    np.testing.assert_array_equal(largest_steps([0.0, -1.0]) == np.inf, [True, False])
+    assert suitable_steps([]).size == 0

@@ -94,7 +94,8 @@ def test_ends_of_the_oracle_table(name: str) -> None:
         "z_mid_parabola": models.profile(Bx / 2, Bx, Bz, H, w, "SCMWE"),
     }
     assert found == pytest.approx({key: CABLES[name][key] for key in found}, rel=1e-9)
-    assert kernels.drawing_point_tension(Bx, Bz, H, w)[0] == pytest.approx(ends.T_A, rel=1e-14)
+    T = H * math.hypot(Bx, Bz) / Bx
+    assert kernels.drawing_point_tension(Bx, Bz, T, w)[0] == pytest.approx(ends.T_A, rel=1e-14)
     assert ends.dbeta == pytest.approx(ends.beta - ends.beta0, abs=1e-14)
 
 
@@ -184,7 +185,8 @@ def printed_length_T(model, order, Bx, Bz, T, w, EA):
     return printed_length(model, order, Bx, Bz, T * Bx / mp.hypot(Bx, Bz), w, EA)
 
 
-def drawing_point_tension(Bx, Bz, H, w):
+def drawing_point_tension(Bx, Bz, T, w):
+    H = T * Bx / mp.hypot(Bx, Bz)
     return H * mp.cosh(slope_at_A(Bx, Bz, H, w))
 
 
@@ -233,7 +235,8 @@ def test_drawing_point_tension_ends_and_sag_to_all_digits() -> None:
     for cable in (*random_cables(20, seed=30), deep):
         with mp.workdps(DIGITS):
             Bx, Bz, H, w = (mp.mpf(x) for x in cable[:4])
-            row = gradient(drawing_point_tension, Bx, Bz, H, w)
+            T = H * mp.hypot(Bx, Bz) / Bx
+            row = gradient(drawing_point_tension, Bx, Bz, T, w)
             a, mu, t = slope_at_A(Bx, Bz, H, w), w / H, Bz / Bx
             u = a + mu * Bx
             dbeta = float(mp.atan(mp.sinh(u)) - mp.atan(t))
@@ -247,9 +250,9 @@ def test_drawing_point_tension_ends_and_sag_to_all_digits() -> None:
         np.testing.assert_allclose(found, forces, rtol=0.0, atol=2e-15 * size)
         assert ends.dbeta == pytest.approx(dbeta, rel=1e-14)
         assert models.sag(*cable[:4]) == pytest.approx(sag, rel=1e-14)
-        found = kernels.drawing_point_tension(*cable[:4])
+        found = kernels.drawing_point_tension(*cable[:2], float(T), cable[3])
         assert found[0] == pytest.approx(forces[2], rel=1e-14)
-        by_force = np.abs(row) + size / np.abs(cable[:3])
+        by_force = np.abs(row) + size / np.abs([*cable[:2], float(T)])
         assert np.all(np.abs(np.subtract(found[1:], row)) <= 1e-14 * by_force)
 
 
@@ -354,7 +357,11 @@ def test_both_forms_of_the_row_give_the_same_rate(cable: tuple, rates: tuple) ->
 def test_row_and_drawing_point_tension_are_reciprocal(cable: tuple) -> None:
     """The energy stored at given (Bx, Bz, l) has the derivatives H, V_B and -T_A (Maxwell)."""
     _, N1, N2, N3 = kernels.length_and_row(CMWE, 4, *cable, 1e9)
-    _, by_Bx, by_Bz, by_H = kernels.drawing_point_tension(*cable)
+    Bx, Bz, H, w = cable
+    L = math.hypot(Bx, Bz)
+    _, by_Bx, by_Bz, by_T = kernels.drawing_point_tension(Bx, Bz, H * L / Bx, w)
+    by_H = by_T * L / Bx  # and what T = H L / Bx changes by at constant H
+    by_Bx, by_Bz = by_Bx - by_T * H * Bz**2 / (L * Bx**2), by_Bz + by_T * H * Bz / (L * Bx)
     assert N1 * by_H - N3 * by_Bx == pytest.approx(1.0, abs=1e-12 * (1 + abs(N1 * by_H)))
     V_x, V_H = (complex_step(partial(kernels.cable_ends, CMWE), cable, i)[5] for i in (0, 2))
     size = abs(V_x) + abs(N2 * by_Bx) + abs(N1 * by_Bz)
@@ -400,11 +407,13 @@ def test_tension_at_the_drawing_point_gives_back_the_horizontal_tension(cable: t
 @given(drawn_cables(most=10.0))
 def test_the_taut_branch_is_found_up_to_where_it_ends(cable: tuple) -> None:
     Bx, Bz, H, w = cable
-    T_A, _, _, by_H = kernels.drawing_point_tension(*cable)
-    assume(by_H > 0.01)
-    found, slack = kernels.horizontal_force_catenary(Bx, Bz, T_A, w)
+    T = H * math.hypot(Bx, Bz) / Bx
+    T_A, _, _, by_T = kernels.drawing_point_tension(Bx, Bz, T, w)
+    assume(by_T > 0.01)
+    found, slack = kernels.chord_tension_catenary(Bx, Bz, T_A, w)
     assert slack == 0
-    assert abs(found - H) * by_H <= 1e-14 * (T_A + w * math.hypot(Bx, Bz))
+    assert kernels.horizontal_force_catenary(Bx, Bz, T_A, w)[0] == pytest.approx(found * H / T)
+    assert abs(found - T) * by_T <= 1e-14 * (T_A + w * math.hypot(Bx, Bz))
 
 
 # --- edges
@@ -513,16 +522,18 @@ def test_complex_numbers_mix_with_real_ones() -> None:
 
 def test_complex_steps_of_the_drawing_point_tension() -> None:
     for Bx, Bz, H, w, EA in POINTS:
-        point = (Bx, Bz, H, w)
+        point = (Bx, Bz, H * math.hypot(Bx, Bz) / Bx, w)
         T_A, *row = kernels.drawing_point_tension(*point)
         slopes = [complex_step(kernels.drawing_point_tension, point, i)[0] for i in range(3)]
-        np.testing.assert_allclose(slopes, row, rtol=1e-11, atol=0.0)
+        # A tension along the chord does not change with Bx, but for the weight: a difference.
+        size = np.abs(row) + T_A / np.abs(point[:3])
+        assert np.all(np.abs(np.subtract(slopes, row)) <= 1e-14 * size)
         # The run of 5 m from drum to eyelet: 5 / (1 + T_A / EA)
         stretched = [-5.0 / EA / (1 + T_A / EA) ** 2 * by for by in row]
         np.testing.assert_allclose(kernels.run_row(5.0, EA, *point), stretched, rtol=1e-14)
-        # The inverse function: dH/dT_A = 1 / (dT_A/dH), on the taut branch
+        # The inverse function: dT/dT_A = 1 / (dT_A/dT), on the taut branch
         if row[2] > 0.1:
-            slope = complex_step(kernels.horizontal_force_catenary, (Bx, Bz, T_A, w), 2)[0]
+            slope = complex_step(kernels.chord_tension_catenary, (Bx, Bz, T_A, w), 2)[0]
             assert slope == pytest.approx(1 / row[2], rel=1e-11)
 
 

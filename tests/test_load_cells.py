@@ -30,7 +30,6 @@ from cdpr_drake.model.rotations import pose_to_vector
 from cdpr_drake.model.servo import MotorRateLaw, ServoSettings
 from cdpr_drake.model.statics import bounded_distribution, weight_wrench, wrench_matrix
 from cdpr_drake.model.vision.outages import Outage
-from cdpr_drake.runs.moves import move_near_the_middle
 from cdpr_drake.runs.paper_tests import paper_test
 from cdpr_drake.systems import PlausibleTension
 
@@ -41,7 +40,13 @@ REST = [0.05, 0.0, 0.1, -1.4, -0.9, 0.8]
 
 
 def move_of(robot: CableRobot) -> tuple[RigidTransform, RigidTransform]:
-    return paper_test(4).poses(robot) if robot.name == "cogiro" else move_near_the_middle(robot)
+    """Return X_WP at the ends of a move: Test 4, or up from a third of the height."""
+    if robot.name == "cogiro":
+        return paper_test(4).poses(robot)
+    centre, height = robot.drawing_points.mean(axis=0), robot.drawing_points[:, 2].max()
+    start = np.array([*centre[:2], 0.3 * height])
+    shift = np.array([0.05 * np.ptp(robot.drawing_points[:, 0]), 0.0, 0.1 * height])
+    return RigidTransform(start), RigidTransform(start + shift)
 
 
 def tensions(

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import cmath
 from dataclasses import dataclass
 
+import numpy as np
+
+from cdpr_drake.diagrams.step import StepWarning
+from cdpr_drake.model.step_size import LARGEST_ERROR, largest_steps, step_error
 from cdpr_drake.study.modes import Mode, Modes
 
-LARGEST_ERROR = 0.1
-"""Part of its own motion by which a step may get the fastest mode wrong."""
-
-
-class StepWarning(UserWarning):
-    """The integrator's step is too coarse for a mode of the robot."""
+__all__ = ["LARGEST_ERROR", "StepLimit", "StepWarning", "step_error", "step_limit"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,22 +26,6 @@ class StepLimit:
     mode: Mode
 
 
-def step_error(eigenvalue: complex, step: float) -> float:
-    """Return how wrong one Runge-Kutta 3 step gets a mode, as a part of the mode's own motion.
-
-    |R(z) - e^z| / |z| with z = step times eigenvalue and R(z) = 1 + z + z^2/2 + z^3/6: about
-    |z|^3 / 24 where steps are small, and above 1 near where the method becomes unstable.
-
-    Args:
-        eigenvalue: of the mode [1/s].
-        step: of the integrator [s].
-    """
-    z = complex(eigenvalue) * step
-    if z == 0.0:
-        return 0.0
-    return abs(1.0 + z + z**2 / 2.0 + z**3 / 6.0 - cmath.exp(z)) / abs(z)
-
-
 def step_limit(modes: Modes, error: float = LARGEST_ERROR) -> StepLimit:
     """Return the largest step of the default integrator that does justice to a robot's modes.
 
@@ -56,22 +38,9 @@ def step_limit(modes: Modes, error: float = LARGEST_ERROR) -> StepLimit:
     """
     if not error > 0.0:
         raise ValueError(f"the error must be positive, got {error}")
-    limits = [(_largest(m.eigenvalue, error), m) for m in modes.modes if not m.is_neutral]
-    if not limits:
+    moving = [mode for mode in modes.modes if not mode.is_neutral]
+    if not moving:
         raise ValueError("a step is limited by modes that move, and there are none")
-    step, mode = min(limits, key=lambda limit: limit[0])
-    return StepLimit(step=step, mode=mode)
-
-
-def _largest(eigenvalue: complex, error: float) -> float:
-    """Return the step from which on the error is above the one allowed, by bisection."""
-    low, high = 0.0, 1.0 / abs(eigenvalue)
-    while step_error(eigenvalue, high) <= error:
-        low, high = high, 2.0 * high
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        if step_error(eigenvalue, middle) <= error:
-            low = middle
-        else:
-            high = middle
-    return low
+    steps = largest_steps([mode.eigenvalue for mode in moving], error)
+    first = int(np.argmin(steps))
+    return StepLimit(step=float(steps[first]), mode=moving[first])

@@ -9,6 +9,7 @@ to all sensors are taken seed by seed.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -18,6 +19,7 @@ import numpy as np
 from cdpr_drake.analysis import DefaultGain, default_gain
 from cdpr_drake.batch import Outcome, sweep
 from cdpr_drake.diagrams import ModelledSensing, TargetSensing
+from cdpr_drake.diagrams.step import StepWarning
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.runs.moves import move_near_the_middle
 from cdpr_drake.runs.paper_tests import paper_test, paper_tests
@@ -151,6 +153,7 @@ def ablation_setup(
     seed: int,
     gain: float,
     unknown_payload: float = 0.0,
+    max_step: float | None = None,
 ) -> Setup:
     """Return the run of a robot with some of its sensors.
 
@@ -160,6 +163,7 @@ def ablation_setup(
         seed: of the noise, and of each target's fixed bias.
         gain: lambda [1/s].
         unknown_payload: [kg] that the robot carries and the controller does not know of.
+        max_step: of the integrator [s]; if None, the robot's modes decide.
     """
     cameras = robot.cameras.replace(
         pose_cameras=robot.cameras.pose_cameras[: sensors.pose_cameras], pixel_bias_seed=seed
@@ -177,6 +181,7 @@ def ablation_setup(
         latency=robot.cameras.latency,
         sensing=ModelledSensing(modelled=sensors.modelled, cameras=TargetSensing()),
         seed=seed,
+        max_step=max_step,
     )
 
 
@@ -201,6 +206,7 @@ def ablate(
     *,
     gain: float | None = None,
     unknown_payload: float = 0.0,
+    max_step: float | None = None,
     jobs: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Ablation]:
@@ -211,6 +217,7 @@ def ablate(
         seeds: runs of each set of sensors.
         gain: lambda [1/s]; `suitable_gain` if None.
         unknown_payload: [kg] that the robots carry and the controllers do not know of.
+        max_step: of the integrator [s]; if None, each robot's modes decide.
         jobs: processes at a time; as many as cores if None.
         progress: called with the number of runs done and of all.
 
@@ -220,13 +227,14 @@ def ablate(
     """
     if seeds < 1:
         raise ValueError(f"at least one seed is needed, got {seeds}")
-    plans = [_plan(name, gain, unknown_payload) for name in robots]
+    plans = [_plan(name, gain, unknown_payload, max_step) for name in robots]
     cases = [
         {
             "robot": name,
             "label": sensors.label,
             "gain": setup.gain,
             "unknown_payload": unknown_payload,
+            "max_step": max_step,
             "seed": seed,
         }
         for name, (setup, sets, _) in zip(robots, plans, strict=True)
@@ -252,7 +260,12 @@ def ablate(
 
 
 def ablation_case(
-    robot: str, label: str, gain: float, unknown_payload: float, seed: int
+    robot: str,
+    label: str,
+    gain: float,
+    unknown_payload: float,
+    seed: int,
+    max_step: float | None = None,
 ) -> dict[str, float]:
     """Return the metrics of one run; NaN for a run that did not settle.
 
@@ -262,10 +275,14 @@ def ablation_case(
         gain: lambda [1/s].
         unknown_payload: [kg].
         seed: of noise and bias.
+        max_step: of the integrator [s].
     """
     true = load_robot(robot)
     sensors = next(s for s in sensor_sets(true) if s.label == label)
-    summary = run(ablation_setup(true, sensors, seed, gain, unknown_payload)).summary
+    setup = ablation_setup(true, sensors, seed, gain, unknown_payload, max_step)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", StepWarning)  # said once, of the first run
+        summary = run(setup).summary
     values = {name: getattr(summary, name) for name in METRICS}
     return {name: math.nan if v is None else float(v) for name, v in values.items()}
 
@@ -277,7 +294,7 @@ def _move(robot: CableRobot) -> Any:
 
 
 def _plan(
-    name: str, gain: float | None, unknown_payload: float
+    name: str, gain: float | None, unknown_payload: float, max_step: float | None
 ) -> tuple[Setup, tuple[SensorSet, ...], DefaultGain | None]:
     """Return the first run of a robot, which works, all sets of sensors, and why that gain."""
     robot = load_robot(name)
@@ -285,7 +302,7 @@ def _plan(
     chosen = suitable_gain(robot, unknown_payload) if gain is None else None
     pace = gain if chosen is None else chosen.gain
     assert pace is not None
-    setup = ablation_setup(robot, sets[0], 0, pace, unknown_payload)
+    setup = ablation_setup(robot, sets[0], 0, pace, unknown_payload, max_step)
     prepare(setup)
     return setup, sets, chosen
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from cdpr_drake.analysis.default_gain import DefaultGain, lowest_gain
-from cdpr_drake.analysis.step_size import StepWarning
 from cdpr_drake.diagrams.sensing import sensing_called
+from cdpr_drake.diagrams.step import StepWarning
 from cdpr_drake.model.calibration_errors import CalibrationErrors, misjudged
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.rotations import pose_to_vector
@@ -140,7 +140,7 @@ def draw(
 
 
 def run_case(seed: int, base: Mapping[str, Any], **spread: Any) -> dict[str, Any]:
-    """Run one case and return what came of it: `METRICS`, what was drawn, the time it took.
+    """Run one case and return what came of it: `METRICS`, what was drawn, the steps.
 
     Args:
         seed: of all that is drawn.
@@ -162,7 +162,8 @@ def run_case(seed: int, base: Mapping[str, Any], **spread: Any) -> dict[str, Any
         summary = run(setup).summary
     values = {name: getattr(summary, name) for name in METRICS}
     result = {name: math.nan if value is None else float(value) for name, value in values.items()}
-    return {**drawn, **result, "simulated_time": summary.simulated_time}
+    steps = {"step": summary.step, "simulated_time": summary.simulated_time}
+    return {**drawn, **result, **steps}
 
 
 def _carrying(robot: CableRobot, payload: float) -> CableRobot:

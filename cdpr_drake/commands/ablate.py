@@ -34,6 +34,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
     what.add_argument("--unknown-payload", metavar="KG",
                       type=common.positive(" kg", or_zero=True), default=0.0,
                       help="carried, and not known to the controller (default: 0)")  # fmt: skip
+    what.add_argument("--max-step", **common.MAX_STEP)
     what.add_argument("--jobs", **common.JOBS)
     common.add_output(parser)
 
@@ -49,6 +50,7 @@ def _ablate(options: Namespace) -> int:
             options.seeds,
             gain=options.gain,
             unknown_payload=options.unknown_payload,
+            max_step=options.max_step,
             jobs=options.jobs,
             progress=progress,
         )

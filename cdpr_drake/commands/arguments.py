@@ -150,6 +150,8 @@ SAMPLE_TIME = _taking("S", "of the vision loop (default: the robot's)", type=flo
 LATENCY = _taking("S", "from image to motors (default: the robot's)", type=float)
 SPAN = _taking("FROM,TO,N", type=parse_span)
 SEED = _taking("N", "of all that is drawn at random (default: 0)", type=int, default=0)
+MAX_STEP = _taking("S", "step of the integrator (default: 0.01, or less where the robot's modes "
+                   "need it)", type=positive(" s"))  # fmt: skip
 JOBS = _taking("N", "processes (default: as many as cores)", type=parse_count)
 NO_NOISE: dict[str, Any] = {"action": "store_true", "help": "perfect cameras and load cells"}
 

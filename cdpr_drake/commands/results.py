@@ -86,6 +86,12 @@ def print_results(runs: Sequence[Run]) -> None:
     for r in runs:
         if text := _losses(r):
             print_wrapped(f"{r.setup.label}: {text}.")
+        step = r.record.step
+        if step.since is not None and step.decided_by == "modes":
+            print_wrapped(
+                f"{r.setup.label}: steps of {1e3 * step.size:.3g} ms from {step.since:.3g} s on, "
+                f"for {step.mode}."
+            )
         for cable, time in sorted(r.summary.slack_cables.items()):
             print_wrapped(f"{r.setup.label}: cable {cable} went slack at {time:.1f} s.")
 

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from cdpr_drake.analysis.default_gain import DefaultGain
     from cdpr_drake.batch.sweeps import Sweep
+    from cdpr_drake.diagrams.step import Step
 
 CASES = "cases"
 """Folder in the output's with the results as they arrived."""
@@ -60,6 +61,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
                        "robot file's; else 0.1, or half the limit there if less)")  # fmt: skip
 
     where = parser.add_argument_group("where it runs")
+    where.add_argument("--max-step", **common.MAX_STEP)
     where.add_argument("--jobs", **common.JOBS)
     where.add_argument("--dask", metavar="ADDRESS",
                        help="scheduler of a Dask cluster (the `cluster` extra)")  # fmt: skip
@@ -77,7 +79,7 @@ def _sweep(options: Namespace) -> int:
     with input_refused():
         base, spread, chosen = _plan(options)
         setup, _ = draw(base, case_seed(options.seed, 0), **spread)
-        prepare(setup)
+        first = prepare(setup)
     name = as_file_name(f"sweep-{setup.robot.name}")
     options.output = options.output or Path("out") / name
     progress = CaseProgress()
@@ -102,7 +104,7 @@ def _sweep(options: Namespace) -> int:
 
         return {"sweep": lambda: sweep_figure(found)} if len(found.errors) < len(found) else {}
 
-    summary = _summary(options, base, spread, found)
+    summary = _summary(options, base, spread, found) | {"step": _steps(found, first.step)}
     if chosen is not None:
         summary |= chosen.to_dict()
     write_answer(options, name, summary, list(_lines(found, chosen)), figures)
@@ -158,6 +160,8 @@ def _plan(options: Namespace) -> tuple[dict[str, Any], dict[str, Any], DefaultGa
         changes["tensions"] = options.tensions
     if options.until is not None:
         changes["until"] = options.until
+    if options.max_step is not None:
+        changes["max_step"] = options.max_step
     spread: dict[str, Any] = {"calibration": options.calibration}
     for name, given, lowest in (
         ("payload", options.payload, 0.0),
@@ -213,6 +217,10 @@ def _columns(found: Sweep) -> dict[str, np.ndarray]:
 
 def _lines(found: Sweep, chosen: DefaultGain | None) -> Iterator[str]:
     """Yield the lines of the answer."""
+    import numpy as np
+
+    from cdpr_drake.diagrams.step import MAX_STEP
+
     if chosen is not None and chosen.reason():
         yield from wrapped(f"At {gain_in_words(chosen.gain, chosen)}.")
     if len(found.errors) < len(found):
@@ -220,6 +228,9 @@ def _lines(found: Sweep, chosen: DefaultGain | None) -> Iterator[str]:
         late = sum(map(math.isnan, found.column("settled_after"))) - len(found.errors)
         if late:
             yield f"{late} of {len(found)} did not settle to 2 % in time."
+        smallest = np.nanmin(found.column("step"))
+        if smallest != MAX_STEP:
+            yield f"The integrator's step is {1e3 * smallest:.3g} ms at its smallest."
     for case, (kind, message) in found.errors.items():
         yield from wrapped(f"case {case}: {kind}: {message}")
     yield ""
@@ -277,6 +288,20 @@ def _summary(
         "failures": {str(case): list(error) for case, error in found.errors.items()},
         "cpu_time_s": found.cpu_time,
         "wall_time_s": found.wall_time,
+    }
+
+
+def _steps(found: Sweep, first: Step) -> dict[str, Any]:
+    """Return the integrator's steps [s] of the cases, and what the `first` is to say of them."""
+    import numpy as np
+
+    steps = np.zeros(0) if len(found.errors) == len(found) else found.column("step")
+    return {
+        "lowest_s": float(np.nanmin(steps)) if len(steps) else None,
+        "highest_s": float(np.nanmax(steps)) if len(steps) else None,
+        "decided_by": first.decided_by,
+        "mode": first.mode,
+        "warning": first.doubt or None,
     }
 
 

@@ -60,7 +60,7 @@ def fitted_table(columns: Sequence[Column]) -> str:
 def warnings_on_one_line() -> Iterator[None]:
     """Print this package's warnings on one line of stderr each, and each only once."""
     from cdpr_drake.analysis.stability import StabilityWarning
-    from cdpr_drake.analysis.step_size import StepWarning
+    from cdpr_drake.diagrams.step import StepWarning
     from cdpr_drake.model.robot import RobotFileWarning
 
     ours = (RobotFileWarning, StabilityWarning, StepWarning)

@@ -110,6 +110,12 @@ class _Filter:
     def __init__(self, system: FirstOrderLowPassFilter) -> None:
         self._system = system
 
+    @property
+    def eigenvalues(self) -> np.ndarray:
+        """The filter's, (n,) [1/s]."""
+        rates: np.ndarray = -1.0 / self._system.get_time_constants_vector()
+        return rates
+
     def settle(self, context: Context) -> None:
         context.SetContinuousState(self._system.get_input_port().Eval(context))
 

@@ -7,8 +7,9 @@ import math
 import os
 import textwrap
 import time
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -17,14 +18,12 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from pydrake.systems.framework import Context, Diagram, OutputPort, PortDataType
 
 from cdpr_drake.diagrams.rest import robot_of
+from cdpr_drake.diagrams.step import MAX_STEP, Step, StepWarning, StepWatch, choose_step
 from cdpr_drake.diagrams.watch import WATCH_PERIOD, LimitWatch
 from cdpr_drake.model.signals import vector_names
 
 INTEGRATOR = "runge_kutta3"
 """Default integrator, by Drake's name: the fastest to 1e-3 mm (benchmarks/bench_integrators.py)."""
-
-MAX_STEP = 0.01
-"""Default step of the fixed-step Runge-Kutta 3 integrator [s]: six to a period of the winches."""
 
 RECORDED = (
     "pose",
@@ -62,6 +61,7 @@ class Record:
         context: the context at the end.
         wall_time: how long the run took [s].
         slack_cables: for each cable (counting from 1) that went slack, the first time [s].
+        step: the integrator's, at its smallest, and why it was that.
     """
 
     time: np.ndarray
@@ -69,6 +69,7 @@ class Record:
     context: Context
     wall_time: float
     slack_cables: dict[int, float]
+    step: Step = field(default_factory=Step)
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Return the values (n, size) of a recorded output port."""
@@ -81,6 +82,8 @@ class Record:
         sizes = [f"{name} ({v.shape[-1]})" for name, v in self.signals.items()]
         count = f"{rows} row" if rows == 1 else f"{rows} rows"
         lines = [f"Record: {span}{count}, computed in {self.wall_time:.3g} s"]
+        if self.step.size != MAX_STEP:
+            lines[0] += f" with steps of {1e3 * self.step.size:.3g} ms"
         lines += _wrapped("signals", sizes or ["none"], 4)
         if self.slack_cables:
             slack = [f"{cable} from {t:.3g} s" for cable, t in sorted(self.slack_cables.items())]
@@ -139,16 +142,21 @@ def make_simulator(
     diagram: Diagram,
     context: Context,
     *,
-    max_step: float = MAX_STEP,
+    max_step: float | Step | None = None,
     accuracy: float | None = None,
     integrator: str = INTEGRATOR,
 ) -> Simulator:
     """Return a simulator with the integrator that suits these diagrams.
 
+    Its step does not change when the robot does, as that of `simulate` may. A StepWarning tells of
+    a `max_step` that is too coarse for a mode.
+
     Args:
         diagram: the diagram.
         context: where it starts, e.g. from `rest_context`.
-        max_step: the integrator's step, its largest with error control [s].
+        max_step: the integrator's step, its largest with error control [s]; if None, 0.01 s or the
+            part of it that the modes in this context need, see `choose_step`. A `Step` that was
+            chosen beforehand is taken without a word.
         accuracy: for error control; fixed steps if None.
         integrator: as Drake calls it.
 
@@ -156,19 +164,10 @@ def make_simulator(
         ValueError: a step or an accuracy that is not positive and finite.
         RuntimeError: Drake has no such integrator, or none with or without error control.
     """
-    _check_positive("the integrator's step, max_step,", max_step, " s")
-    if accuracy is not None:
-        _check_positive("the accuracy", accuracy)
-    simulator = Simulator(diagram, context)
-    config = SimulatorConfig()
-    config.integration_scheme = integrator
-    config.max_step_size = max_step
-    config.start_time = context.get_time()  # which applying the configuration would set to 0
-    config.use_error_control = accuracy is not None
-    if accuracy is not None:
-        config.accuracy = accuracy
-    ApplySimulatorConfig(config, simulator)
-    return simulator
+    step = _step(diagram, context, max_step, accuracy, integrator)
+    if step.doubt and step is not max_step:
+        warnings.warn(step.doubt, StepWarning, stacklevel=2)
+    return _simulator(diagram, context, step, accuracy, integrator)
 
 
 def simulate(
@@ -178,7 +177,7 @@ def simulate(
     *,
     record: Iterable[str] | None = None,
     every: float = 0.05,
-    max_step: float = MAX_STEP,
+    max_step: float | Step | None = None,
     accuracy: float | None = None,
     integrator: str = INTEGRATOR,
     progress: Callable[[float], None] | None = None,
@@ -191,6 +190,12 @@ def simulate(
     each cable. `DiagramBuilder.ExportOutput(robot.GetOutputPort("pose"), "pose")` does that for
     the first.
 
+    Where nobody gives a step, it is 0.01 s, or the part of it that the robot's modes need; as
+    tensions rise or the platform moves far, it becomes smaller when they need that. `choose_step`
+    says what it is chosen from. A StepWarning tells, once, of a step given that is too coarse.
+    Where damping is so heavy, or friction so steep, that the step becomes tiny, the integrator
+    "radau3" in steps of 0.01 s may be many times faster.
+
     Args:
         diagram: the diagram.
         context: where it starts; it is moved on to the end.
@@ -198,7 +203,8 @@ def simulate(
         record: names of output ports, each of which has to be there; those of `RECORDED` that the
             diagram has if None.
         every: period of the record [s].
-        max_step: step of the integrator [s].
+        max_step: step of the integrator [s], its largest with error control; chosen if None. A
+            `Step` that was chosen beforehand is taken without a word.
         accuracy: for error control; fixed steps if None.
         integrator: as Drake calls it.
         progress: called with the time at each record.
@@ -223,14 +229,20 @@ def simulate(
     times: list[float] = []
     values: dict[str, list[np.ndarray]] = {name: [] for name in ports}
     watch = LimitWatch(robot_of(diagram))
-    simulator = make_simulator(
-        diagram, context, max_step=max_step, accuracy=accuracy, integrator=integrator
-    )
+    step = _step(diagram, context, max_step, accuracy, integrator)
+    if step.doubt and step is not max_step:
+        warnings.warn(step.doubt, StepWarning, stacklevel=2)
+    steps = StepWatch(diagram, context, step)
+    simulator = _simulator(diagram, context, step, accuracy, integrator)
     begun = time.perf_counter()
     simulator.Initialize()
     for t, is_record in _stops(context.get_time(), until, every):
         simulator.AdvanceTo(t)
         watch.check_pose(t, pose.Eval(context))
+        if steps.look(t, pose.Eval(context), tension.Eval(context)):
+            simulator.get_mutable_integrator().set_maximum_step_size(steps.step.size)
+            if steps.step.doubt and not step.doubt:
+                warnings.warn(steps.step.doubt, StepWarning, stacklevel=2)
         if is_record:
             watch.check_tensions(t, tension.Eval(context))
             times.append(t)
@@ -244,12 +256,46 @@ def simulate(
         context=context,
         wall_time=time.perf_counter() - begun,
         slack_cables=watch.slack,
+        step=steps.step,
     )
 
 
-def _check_positive(what: str, value: float, unit: str = "") -> None:
-    if not (math.isfinite(value) and value > 0.0):
-        raise ValueError(f"{what} must be positive and finite, got {value}{unit}")
+def _step(
+    diagram: Diagram,
+    context: Context,
+    max_step: float | Step | None,
+    accuracy: float | None,
+    integrator: str,
+) -> Step:
+    """Return the step that was given or is chosen.
+
+    What a step must be is known of Runge-Kutta 3: another integrator gets the same if nobody gives
+    one, and no opinion on one that is given.
+    """
+    if accuracy is not None and not (math.isfinite(accuracy) and accuracy > 0.0):
+        raise ValueError(f"the accuracy must be positive and finite, got {accuracy}")
+    if isinstance(max_step, Step):
+        return max_step
+    if accuracy is not None:
+        return Step(size=MAX_STEP if max_step is None else max_step, decided_by="accuracy")
+    if max_step is not None and integrator != INTEGRATOR:
+        return Step(size=max_step, decided_by="given")
+    return choose_step(diagram, context, max_step)
+
+
+def _simulator(
+    diagram: Diagram, context: Context, step: Step, accuracy: float | None, integrator: str
+) -> Simulator:
+    simulator = Simulator(diagram, context)
+    config = SimulatorConfig()
+    config.integration_scheme = integrator
+    config.max_step_size = step.size
+    config.start_time = context.get_time()  # which applying the configuration would set to 0
+    config.use_error_control = accuracy is not None
+    if accuracy is not None:
+        config.accuracy = accuracy
+    ApplySimulatorConfig(config, simulator)
+    return simulator
 
 
 def _vector_outputs(diagram: Diagram) -> dict[str, OutputPort]:

@@ -156,6 +156,27 @@ def cable_shape(
     return points
 
 
+def chord_tension(L: Array, l0: Array, T_A: Array, T_B: Array, w: float, EA: ArrayLike) -> Array:
+    """Return the chord tensions (k,) [N] of cables at rest: H over the cosine of the chord.
+
+    T = L / (l0 / EA + (1 / w) ln((T_B + V_B) / (T_A + V_A))), the equation of the span divided by
+    its width, which a vertical cable has not.
+
+    Args:
+        L: (k,) [m] lengths of the chords.
+        l0: (k,) [m] unstrained lengths of the spans.
+        T_A: (k,) [N] tensions at the drawing points.
+        T_B: (k,) [N] tensions at the attachment points.
+        w: [N/m] weight per unstrained metre.
+        EA: (k,) or one number [N], axial stiffness.
+    """
+    both = T_A + T_B
+    y = np.minimum(w * l0 / both, 1.0)  # 1 where a cable hangs as a loop without width
+    with np.errstate(divide="ignore"):
+        bent = 2.0 * np.arctanh(y) / np.maximum(y, 1e-300)
+    return L / (l0 * (1.0 / np.asarray(EA) + np.where(y > 1e-8, bent, 2.0) / both))
+
+
 def cable_energy(
     p_AB: ArrayLike,
     length: ArrayLike,

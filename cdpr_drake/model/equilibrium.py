@@ -11,6 +11,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.model.arrays import RobotArrays
 from cdpr_drake.model.cables import CableSet, pose_arrays
+from cdpr_drake.model.catenary import chord_tension
 from cdpr_drake.model.inverse_kinematics import motor_angles
 from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.robot import CableRobot
@@ -135,6 +136,21 @@ def platform_balance(
     return CableSet(robot).balance(X_WP, length)[:3]
 
 
+def state_at(robot: CableRobot, X_WP: RigidTransform, length: Array) -> RestState:
+    """Return the state that a robot would have if it stopped at a pose, in balance or not.
+
+    Args:
+        robot: the robot.
+        X_WP: the pose.
+        length: (k,) [m] total unstrained lengths.
+
+    Raises:
+        EquilibriumError: a cable's catenary was not found.
+    """
+    unbalanced, _, out = platform_balance(robot, X_WP, length)
+    return _state(robot, X_WP, length, out, _relative(robot, unbalanced))
+
+
 def forward_kinematics(
     robot: CableRobot,
     length: ArrayLike,
@@ -209,16 +225,17 @@ def _moved_by(robot: CableRobot, length: Array, X_WP: RigidTransform, wrench: Ar
 def _state(
     robot: CableRobot, X_WP: RigidTransform, length: Array, out: Array, residual: float
 ) -> RestState:
-    geometry = cable_geometry(robot, X_WP)
-    angles = motor_angles(robot, length)
+    angles, cable = motor_angles(robot, length), robot.cable
+    L, T_A, T_B = cable_geometry(robot, X_WP).L, out[:, 3], out[:, 4]
+    EA = cable.stiffness(T_A)
     return RestState(
         X_WP=X_WP,
         unstrained_length=length,
-        chord_tension=out[:, 12] * geometry.L / geometry.Bx,
-        tension_at_drawing_point=out[:, 3],
-        tension_at_attachment_point=out[:, 4],
+        chord_tension=chord_tension(L, out[:, 13], T_A, T_B, robot.weight_per_metre, EA),
+        tension_at_drawing_point=T_A,
+        tension_at_attachment_point=T_B,
         motor_angles=angles,
-        desired_motor_angles=WinchModel(robot).at_rest(angles, out[:, 3])[1],
+        desired_motor_angles=WinchModel(robot).at_rest(angles, T_A)[1],
         residual=residual,
     )
 

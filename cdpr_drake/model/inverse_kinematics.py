@@ -8,18 +8,15 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import GeometryError, TensionError
 from cdpr_drake.model.arrays import RobotArrays
-from cdpr_drake.model.cable_models import cable_model_index, cable_model_name, unstrained_length
-from cdpr_drake.model.distribution import minimum_norm_within
+from cdpr_drake.model.cable_models import cable_model_index, cable_model_name
 from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, as_pose, pose_to_vector
 from cdpr_drake.model.statics import (
-    CLOSEST,
     DEFAULT_RULE,
-    D_theta,
+    MINIMUM_NORM,
     check_rule,
     distribute,
-    tension_distribution,
     weight_wrench,
     what_limits_allow,
     wrench_matrix,
@@ -58,9 +55,14 @@ class InverseKinematics:
         check_rule(rule)
         self.robot, self.cable_model, self.order, self.rule = robot, cable_model, order, rule
         self._kernel = kernel
-        self._head = (cable_model_index(cable_model_name(cable_model)), order)
-        arrays = RobotArrays(robot)
-        self._robot_arrays = (arrays.points, arrays.body, arrays.stiffness)
+        cable, arrays = robot.cable, RobotArrays(robot)
+        low, high = cable.limits
+        wish = 0.5 * (low + high) if cable.preferred_tension is None else cable.preferred_tension
+        known = {MINIMUM_NORM: kernel.LEAST, DEFAULT_RULE: kernel.LEAST_WITHIN}
+        index = cable_model_index(cable_model_name(cable_model))
+        self._head = (index, order, known.get(rule, kernel.CLOSEST))
+        limits = np.array([low, high, wish])
+        self._tail = (arrays.points, arrays.body, arrays.stiffness, limits)
 
     def lengths(self, pose: RigidTransform | ArrayLike) -> Array:
         """Return the total unstrained lengths (k,) [m] at a `pose`, X_WP or [rpy, xyz].
@@ -82,59 +84,40 @@ class InverseKinematics:
             GeometryError: the wrench matrix has rank below 6.
             TensionError: the rule finds no tensions that hold the platform.
         """
-        k = self.robot.num_cables
+        k, kernel = self.robot.num_cables, self._kernel
         out, T, jacobian = np.zeros(k), np.zeros(k), np.zeros((k, 6))
-        if self.rule != CLOSEST:
-            if with_jacobian:
-                status = self._kernel.unstrained_lengths_jacobian(
-                    *self._head, pose, *self._robot_arrays, out, T, jacobian
-                )
-            else:
-                arrays = self._robot_arrays
-                status = self._kernel.unstrained_lengths(*self._head, pose, *arrays, out, T)
-            if status < 0:
-                raise GeometryError("the wrench matrix has rank below 6 at the desired pose")
-            if self._heeds_limits(pose, T, status):
-                return out + self.robot.cable.drum_run, jacobian
         if with_jacobian:
+            status = kernel.unstrained_lengths_jacobian(
+                *self._head, pose, *self._tail, out, T, jacobian
+            )
+        else:
+            status = kernel.unstrained_lengths(*self._head, pose, *self._tail, out, T)
+        if status == kernel.CORNER and with_jacobian:
             steps = STEP * np.eye(6)
-            ends = [[self._bounded(pose + sign * step) for sign in (1.0, -1.0)] for step in steps]
+            ends = [[self.lengths(pose + sign * step) for sign in (1.0, -1.0)] for step in steps]
             jacobian = np.array([(ahead - behind) / (2.0 * STEP) for ahead, behind in ends]).T
-        return self._bounded(pose) + self.robot.cable.drum_run, jacobian
+            return self.lengths(pose), jacobian
+        if status not in (0, kernel.CORNER):
+            self._refuse(pose, status)
+        return out + self.robot.cable.drum_run, jacobian
 
-    def _heeds_limits(self, pose: Array, T: Array, status: int) -> bool:
-        """Return whether tensions of least norm whatever the limits are what the rule asks for."""
-        if self.rule == DEFAULT_RULE:
-            low, high = self.robot.cable.limits
-            return status == 0 and bool(T.min() >= low and T.max() <= high)
-        if status == 0:
-            return True
+    def _refuse(self, pose: Array, status: int) -> None:
+        """Raise what a status of the kernel other than zero means."""
+        if status == self._kernel.RANK_DEFICIENT:
+            raise GeometryError("the wrench matrix has rank below 6 at the desired pose")
         geometry = cable_geometry(self.robot, pose)
-        wrench = weight_wrench(self.robot, geometry)
-        allowed = what_limits_allow(self.robot, wrench_matrix(geometry), wrench)
+        matrix, wrench = wrench_matrix(geometry), weight_wrench(self.robot, geometry)
+        if status == self._kernel.INFEASIBLE:
+            distribute(self.robot, matrix, wrench, self.rule, as_pose(pose))  # which says why not
+            raise TensionError(
+                f"the desired pose {np.array2string(pose, precision=3)} is at the very edge of "
+                "what tensions within the limits can hold"
+            )
         raise TensionError(
             f"at the desired pose {np.array2string(pose, precision=3)} the tensions of least "
-            f"norm would need cable {status} to push; {allowed}"
+            f"norm would need cable {status} to push; "
+            f"{what_limits_allow(self.robot, matrix, wrench)}"
         )
-
-    def _bounded(self, pose: Array) -> Array:
-        """Return the spans' unstrained lengths (k,) [m] with tensions within the limits."""
-        robot, geometry = self.robot, cable_geometry(self.robot, pose)
-        slope = geometry.L / geometry.Bx
-        if self.rule == CLOSEST:
-            H = tension_distribution(robot, pose, self.rule) / slope
-        else:
-            low, high = (limit / slope for limit in robot.cable.limits)
-            wrench = weight_wrench(robot, geometry)
-            try:
-                H = minimum_norm_within(D_theta(geometry), wrench, low, high)
-            except TensionError:
-                distribute(robot, wrench_matrix(geometry), wrench, self.rule, as_pose(pose))
-                raise  # at the very edge of the limits
-        T = H * slope
-        EA = np.array([robot.cable.stiffness(t) for t in T])
-        w = robot.weight_per_metre
-        return unstrained_length(self.cable_model, geometry.Bx, geometry.Bz, H, w, EA, self.order)
 
     def motor_angles(self, pose: RigidTransform | ArrayLike) -> Array:
         """Return the motor angles (k,) [rad] at a `pose`, X_WP or [rpy, xyz].

@@ -19,8 +19,8 @@ from pydrake.math import RigidTransform
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, as_pose, numbers, skew
 
-MIN_HORIZONTAL_SPAN = 1e-6
-"""Smallest Bx / L: below it a cable hangs vertically and its plane is undefined."""
+MIN_HORIZONTAL_SPAN = 1e-12
+"""Smallest Bx / L: a cable that hangs vertically has no plane, and is given one."""
 
 
 class CableEnds(NamedTuple):

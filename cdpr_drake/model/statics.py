@@ -158,10 +158,9 @@ def D_s(
     """
     X_WP = as_pose(pose)
     geometry = cable_geometry(robot, X_WP, R_FW)
-    matrix = D_theta(geometry)
-    check_rank(matrix)
+    check_rank(wrench_matrix(geometry))
     change = D_tau(robot, geometry, H).sum(0) - D_ext(robot, geometry)
-    return -np.linalg.lstsq(matrix, change, rcond=None)[0]
+    return -np.linalg.lstsq(D_theta(geometry), change, rcond=None)[0]
 
 
 def minimum_norm_horizontal_tensions(robot: CableRobot, pose: RigidTransform | ArrayLike) -> Array:
@@ -177,9 +176,8 @@ def minimum_norm_horizontal_tensions(robot: CableRobot, pose: RigidTransform | A
     """
     X_WP = as_pose(pose)
     geometry = cable_geometry(robot, X_WP)
-    matrix = D_theta(geometry)
-    check_rank(matrix)
-    return distribute(robot, matrix, weight_wrench(robot, geometry), MINIMUM_NORM, X_WP)
+    check_rank(wrench_matrix(geometry))
+    return distribute(robot, D_theta(geometry), weight_wrench(robot, geometry), MINIMUM_NORM, X_WP)
 
 
 def tension_distribution(

@@ -52,6 +52,10 @@ class Summary:
             the truth with noise, or under joint space control.
         pose_images_lost: images of single pose cameras that were of no use; None likewise.
         tangent_frames_lost: for each cable the frames without a tangent; None likewise.
+        step: the integrator's, at its smallest [s].
+        step_decided_by: "usual", "modes" or "given", see `diagrams.step.Step`.
+        step_mode: the mode that allows the smallest step, in words.
+        step_warning: why a step given is too coarse for it; None if it is not.
         simulated_time: [s].
         wall_time: how long the run took [s].
         real_time_factor: simulated time over the time it took.
@@ -74,6 +78,10 @@ class Summary:
     pose_frames_lost: int | None
     pose_images_lost: int | None
     tangent_frames_lost: tuple[int, ...] | None
+    step: float
+    step_decided_by: str
+    step_mode: str
+    step_warning: str | None
     simulated_time: float
     wall_time: float
     real_time_factor: float
@@ -99,6 +107,7 @@ _UNITS = {
     "lowest_tension": "N",
     "highest_tension": "N",
     "slack_cables": "s",
+    "step": "s",
     "simulated_time": "s",
     "wall_time": "s",
 }
@@ -171,6 +180,10 @@ def summarize(record: Record, offset: Array) -> Summary:
         pose_frames_lost=sum(lost["frames_lost"]) if "frames_lost" in lost else None,
         pose_images_lost=sum(lost["images_lost"]) if "images_lost" in lost else None,
         tangent_frames_lost=lost.get("tangent_frames_lost"),
+        step=record.step.size,
+        step_decided_by=record.step.decided_by,
+        step_mode=record.step.mode,
+        step_warning=record.step.doubt or None,
         simulated_time=float(time[-1] - time[0]),
         wall_time=record.wall_time,
         real_time_factor=record.real_time_factor,

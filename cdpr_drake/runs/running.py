@@ -11,9 +11,7 @@ import numpy as np
 from pydrake.systems.framework import Context, Diagram
 
 from cdpr_drake.analysis.default_gain import predicted_limit
-from cdpr_drake.analysis.platform_modes import platform_modes
 from cdpr_drake.analysis.stability import StabilityWarning
-from cdpr_drake.analysis.step_size import StepWarning, step_error, step_limit
 from cdpr_drake.diagrams import (
     JointSpaceLoop,
     Record,
@@ -22,6 +20,7 @@ from cdpr_drake.diagrams import (
     rest_context,
     simulate,
 )
+from cdpr_drake.diagrams.step import Step, StepWarning, choose_step
 from cdpr_drake.errors import CdprError
 from cdpr_drake.model.rotations import Array, pose_to_vector, vector_to_pose
 from cdpr_drake.model.servo import PoseErrorMap
@@ -39,11 +38,13 @@ class Prepared:
         setup: the setup.
         loop: the diagram.
         context: its context at the start.
+        step: the integrator's at the start.
     """
 
     setup: Setup
     loop: Diagram
     context: Context
+    step: Step
 
     def tension_at_drawing_point(self) -> Array:
         """Return the tensions (k,) [N] of the robot where it starts."""
@@ -71,7 +72,7 @@ def prepare(setup: Setup) -> Prepared:
     """Return a run ready to start. All that can be refused beforehand is refused here.
 
     A StabilityWarning tells that the gain is above the limit predicted at the goal, or why there is
-    no prediction; a StepWarning that the integrator's step is too coarse for the robot's modes.
+    no prediction; a StepWarning that the setup's step is too coarse for the robot's modes.
 
     Args:
         setup: the setup.
@@ -91,9 +92,10 @@ def prepare(setup: Setup) -> Prepared:
     _evaluate_all(loop, context)
     if message := doubt_about_gain(setup):
         warnings.warn(message, StabilityWarning, stacklevel=2)
-    if message := doubt_about_step(setup):
-        warnings.warn(message, StepWarning, stacklevel=2)
-    return Prepared(setup=setup, loop=loop, context=context)
+    step = choose_step(loop, context, setup.max_step)
+    if step.doubt:
+        warnings.warn(step.doubt, StepWarning, stacklevel=2)
+    return Prepared(setup=setup, loop=loop, context=context, step=step)
 
 
 def run(setup: Setup | Prepared, progress: Callable[[float], None] | None = None) -> Run:
@@ -114,7 +116,7 @@ def run(setup: Setup | Prepared, progress: Callable[[float], None] | None = None
         ready.context,
         setup.until,
         every=RECORD_PERIOD,
-        max_step=setup.max_step,
+        max_step=ready.step,
         progress=progress,
     )
     if not setup.is_vision_based:
@@ -146,27 +148,6 @@ def doubt_about_gain(setup: Setup) -> str:
     return (
         f"{setup.label}: the gain of {setup.gain:g}/s is above the limit predicted at the goal, "
         f"{limit.gain:.3g}/s, where {limit.mode} goes unstable at {limit.frequency:.3g} Hz"
-    )
-
-
-def doubt_about_step(setup: Setup) -> str:
-    """Return why the integrator's step is too coarse for a setup, in a line; "" if it is not.
-
-    Args:
-        setup: the setup.
-
-    Raises:
-        GeometryError, TensionError, EquilibriumError: the robot cannot rest at the start.
-    """
-    modes = platform_modes(setup.robot, setup.start, "controlled", tensions=setup.tensions)
-    limit = step_limit(modes)
-    if setup.max_step <= limit.step:
-        return ""
-    wrong = step_error(limit.mode.eigenvalue, setup.max_step)
-    return (
-        f"{setup.label}: the integrator's step of {1e3 * setup.max_step:g} ms is too coarse for a "
-        f"mode at {limit.mode.frequency:.3g} Hz: it gets {100.0 * wrong:.0f} % of its motion "
-        f"wrong; {1e3 * limit.step:.2g} ms would do"
     )
 
 

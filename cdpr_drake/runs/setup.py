@@ -11,7 +11,6 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.analysis.default_gain import DefaultGain, default_gain
 from cdpr_drake.diagrams import JointSpaceLoop, VisionLoop
-from cdpr_drake.diagrams.simulation import MAX_STEP
 from cdpr_drake.diagrams.wiring import SystemOrMaker
 from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.model.rotations import as_pose
@@ -38,7 +37,7 @@ class Setup:
         noise: whether cameras and load cells are noisy; joint space control uses neither.
         seed: of the noise.
         until: how long to run [s].
-        max_step: step of the integrator [s].
+        max_step: step of the integrator [s]; if None, the robot's modes decide, see `simulate`.
         tensions: those of vision-based control at the start, those of joint space control's inverse
             kinematics all the way: one of `model.statics.RULES`.
         parts: what else pulls at the platform, see `make_vision_based_control`.
@@ -57,7 +56,7 @@ class Setup:
     noise: bool = True
     seed: int = 0
     until: float = 80.0
-    max_step: float = MAX_STEP
+    max_step: float | None = None
     tensions: str = DEFAULT_RULE
     parts: tuple[SystemOrMaker, ...] = ()
     chosen: DefaultGain | None = dataclasses.field(default=None, init=False)
@@ -69,7 +68,7 @@ class Setup:
             ("the time to run until", self.until),
             ("the integrator's step", self.max_step),
         ):
-            if not (math.isfinite(value) and value > 0.0):
+            if value is not None and not (math.isfinite(value) and value > 0.0):
                 raise ValueError(f"{name} must be positive and finite, got {value}")
         if self.until < RECORD_PERIOD:
             raise ValueError(f"a run takes at least {RECORD_PERIOD} s, got {self.until} s")

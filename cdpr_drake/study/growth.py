@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,9 +11,13 @@ import numpy as np
 from pydrake.systems.framework import Context, Diagram
 
 from cdpr_drake.diagrams import make_simulator
+from cdpr_drake.diagrams.step import StepWarning, choose_step
 from cdpr_drake.study.modes import DEADBEAT
 from cdpr_drake.study.sampled import OnePeriodMap, one_period_map
 from cdpr_drake.study.state_space import Array
+
+LARGEST_STEP = 2.5e-3
+"""Of the integrator [s]: coarser ones damp a platform's modes visibly."""
 
 NEUTRAL_DISTANCE = 1e-7
 """Eigenvalues of a period's map this close to 1 are neutral."""
@@ -45,7 +50,7 @@ def simulate_modes(
     *,
     which: Sequence[int] = (0,),
     size: float = 1e-5,
-    max_step: float = 2.5e-3,
+    max_step: float | None = None,
 ) -> tuple[SimulatedMode, ...]:
     """Return how modes of a sampled loop grow or decay in a nonlinear simulation.
 
@@ -58,9 +63,11 @@ def simulate_modes(
         duration: [s].
         which: of the modes that are not neutral, 0 being the one of slowest decay.
         size: largest change of the platform's coordinates at the start, by each [m, rad].
-        max_step: step of the integrator [s]; coarse steps damp lightly damped modes by themselves.
+        max_step: step of the integrator [s]; if None, 2.5 ms, or less where the robot's modes need
+            it: coarser steps damp lightly damped modes by themselves.
 
     Raises:
+        ValueError: a step that is not positive and finite.
         LinearizationError: the diagram is not a sampled loop of the kind `one_period_map` takes.
     """
     period_map = one_period_map(diagram, context)
@@ -73,7 +80,10 @@ def simulate_modes(
     pose = [i for i, name in enumerate(period_map.states) if "platform/" in name][:6]
     shapes = right * size / np.abs(right[pose]).max(axis=0)
     _set_state(own, rest + shapes.real.sum(axis=1))
-    simulator = make_simulator(diagram, own, max_step=max_step)
+    step = choose_step(diagram, own, max_step, LARGEST_STEP)
+    if step.doubt:
+        warnings.warn(step.doubt, StepWarning, stacklevel=2)
+    simulator = make_simulator(diagram, own, max_step=step)
     simulator.Initialize()
     start, T = context.get_time(), period_map.period
     count = round(duration / T)

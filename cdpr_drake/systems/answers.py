@@ -25,7 +25,11 @@ class SystemAnswers(Protocol):
         state_names: what each of the continuous states is, e.g. "angle[1]".
         discrete_state_names: what each entry of the discrete state is, group after group.
         cable_robot: the robot whose cables this system is; it has an output port
-            "tension_at_drawing_point". A diagram has one such system.
+            "tension_at_drawing_point". A diagram has one such system. If it also has ports
+            "platform_state" and "unstrained_length", inputs or outputs, the integrator's step
+            follows the robot's modes.
+        eigenvalues: of what the system's state does by itself [1/s], besides the robot's modes: the
+            integrator's step follows these too.
         never_rests: whether it is a source of noise, with which no loop has an equilibrium.
         steady_after: the time [s] after which it does the same whatever the time: ramps are over.
     """
@@ -33,6 +37,7 @@ class SystemAnswers(Protocol):
     state_names: tuple[str, ...]
     discrete_state_names: tuple[str, ...]
     cable_robot: CableRobot
+    eigenvalues: ArrayLike
     never_rests: bool
     steady_after: float
 

@@ -99,6 +99,7 @@ class FusedPlant(LeafSystem):
     Attributes:
         numbers: what kernels/plant.py takes of the robot.
         state_names: what the entries of the state are called.
+        eigenvalues: of the load cells' filters [1/s].
 
     Raises:
         ValueError: an unknown command, or what `fused_refusal` says.
@@ -127,6 +128,7 @@ class FusedPlant(LeafSystem):
         self._integrates = command == "motor_rates"
         k = self._k = robot.num_cables
         filters = robot.load_cells.order if load_cells else 0
+        self.eigenvalues = self._cells.eigenvalues if load_cells else np.zeros(0)
         self._solid = self._cables.arrays.solid
         self.numbers = (
             *self._cables.numbers,

@@ -48,6 +48,7 @@ class LoadCellFilter(LeafSystem):
 
     Attributes:
         parameters: (4, k), as kernels/load_cell.py takes them.
+        eigenvalues: (k,) of the filters [1/s].
 
     Raises:
         ValueError: an outage of a cell that is not there.
@@ -69,6 +70,7 @@ class LoadCellFilter(LeafSystem):
         bias = (cells.bias - ours.bias) / ours.gain
         rate = np.full(robot.num_cables, 2.0 * np.pi * cells.cutoff)
         self._filter, self.parameters = filter_derivatives, np.array([gain, bias, sigma, rate])
+        self.eigenvalues = -rate
         self._order = cells.order
         stages = [f"stage_{i + 1}" for i in range(cells.order - 1)]
         self.state_names = numbered(*stages, "tension", count=robot.num_cables)

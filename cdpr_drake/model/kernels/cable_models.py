@@ -323,31 +323,34 @@ def _drawing_point(L, c, s, T, w):
 
 
 @jit
-def drawing_point_tension(Bx, Bz, H, w):
-    """Return (T_A, dT_A/dBx, dT_A/dBz, dT_A/dH): tension of the catenary at the drawing point.
+def drawing_point_tension(Bx, Bz, T, w):
+    """Return (T_A, dT_A/dBx, dT_A/dBz, dT_A/dT): tension of the catenary at the drawing point.
 
-    T_A^2 = H^2 + V_A^2 with V_A of eq. (4).
+    T_A^2 = (c T)^2 + V_A^2 with V_A of eq. (4).
     """
     L = sqrt(Bx * Bx + Bz * Bz)
     c, s = Bx / L, Bz / L
-    T = H / c
     T_A, sin_A, V_A_T, shc, coshc, length = _drawing_point(L, c, s, T, w)
-    half_weight = 0.5 * w / length  # times the row of the CMWE, which has 1 / length in it
-    V_A_x = -T * s / (shc * shc * Bx) - half_weight * Bx * shc * (shc + coshc)
-    V_A_z = T / L * (1.0 + coshc / shc) - half_weight * Bz
-    return T_A, sin_A * V_A_x, sin_A * V_A_z, H / T_A + sin_A * V_A_T / c
+    turn = T / (L * shc * shc)
+    half_weight = 0.5 * w * L / length  # times the row of the CMWE, which has 1 / length in it
+    V_A_x = -c * (turn * s + half_weight * shc * (shc + c * c * coshc))
+    V_A_z = T / L * (1.0 + coshc / shc) - turn * s * s
+    V_A_z = V_A_z - half_weight * s * (1.0 + c * c * shc * coshc)
+    aside = T * T * c * s / (L * T_A)
+    by_T = T * c * c / T_A + sin_A * V_A_T
+    return T_A, aside * s + sin_A * V_A_x, sin_A * V_A_z - aside * c, by_T
 
 
 @jit
-def run_row(run, EA, Bx, Bz, H, w):
-    """Return the derivatives of run / (1 + T_A / EA) with respect to (Bx, Bz, H).
+def run_row(run, EA, Bx, Bz, T, w):
+    """Return the derivatives of run / (1 + T_A / EA) with respect to (Bx, Bz, T).
 
     The unstrained length of the run [m] from drum to eyelet, which stretches with the tension T_A.
     """
-    T_A, by_Bx, by_Bz, by_H = drawing_point_tension(Bx, Bz, H, w)
+    T_A, by_Bx, by_Bz, by_T = drawing_point_tension(Bx, Bz, T, w)
     stretch = 1.0 + T_A / EA
     factor = -run / (EA * stretch * stretch)
-    return factor * by_Bx, factor * by_Bz, factor * by_H
+    return factor * by_Bx, factor * by_Bz, factor * by_T
 
 
 @jit
@@ -375,6 +378,16 @@ def horizontal_force_catenary(Bx, Bz, T_A, w):
     """Return (H, slack): horizontal tension from that at the drawing point, by the catenary.
 
     Slack (1, else 0): T_A is below what the hanging cable needs, and H is the floor w Bx / 20.
+    """
+    T, slack = chord_tension_catenary(Bx, Bz, T_A, w)
+    return T * Bx / sqrt(Bx * Bx + Bz * Bz), slack
+
+
+@jit
+def chord_tension_catenary(Bx, Bz, T_A, w):
+    """Return (T, slack): chord tension from that at the drawing point, by the catenary; Bx >= 0.
+
+    Slack (1, else 0): T_A is below what the hanging cable needs, and T is the floor w L / 20.
     Newton on the taut branch in the chord tension, of which T_A is a convex function: from above,
     the iterates fall monotonically to the root.
     """
@@ -400,4 +413,4 @@ def horizontal_force_catenary(Bx, Bz, T_A, w):
             break  # in T, or in T_A where a flat slope leaves T to round-off
     if slack == 1:
         T = floor
-    return T * c, slack
+    return T, slack

@@ -526,6 +526,12 @@ def _damping(viscosity, speed, e_l, e_t, T_A, T_B):
 
 
 @jit
+def _steepest(L, Bz):
+    """Return the height of the steepest chord that has a plane, of length L, as Bz up or down."""
+    return math.copysign(1.0, Bz) * L * math.sqrt(1.0 - MIN_SLOPE * MIN_SLOPE)
+
+
+@jit
 def _force(
     i, p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, damping_time, differs, out
 ):
@@ -549,6 +555,8 @@ def _force(
         return True, 0.0, 0.0, Bx, none
     w = max(w, MIN_WEIGHT)
     clamped = max(Bx, MIN_SLOPE * L)
+    if clamped > Bx:
+        Bz = _steepest(L, Bz)
     H, V_B, l0, _iterations, failed, near, linear = _solve(
         clamped, Bz, L, l, run, w, asymptote, softening, offset
     )
@@ -747,12 +755,15 @@ def _differentiate(
         py = 1.0 if c == 1 else 0.0
         pz = 1.0 if c == 2 else 0.0
         along = dx * px + dy * py
-        dBx = MIN_SLOPE * (along + Bz * pz) / L if clamped > Bx else along / Bx
-        change = (dBx, pz, 1.0 if c == 6 else 0.0)
+        dBx, dBz = along / Bx, pz
+        if clamped > Bx:
+            dL = (along + Bz * pz) / L
+            dBx, dBz = MIN_SLOPE * dL, _steepest(dL, Bz)
+        change = (dBx, dBz, 1.0 if c == 6 else 0.0)
         dl = change[2]
-        dH = moves[0][0] * dBx + moves[1][0] * pz + moves[2][0] * dl
-        dV_B = moves[0][1] * dBx + moves[1][1] * pz + moves[2][1] * dl
-        dl0 = moves[0][2] * dBx + moves[1][2] * pz + moves[2][2] * dl
+        dH = moves[0][0] * dBx + moves[1][0] * dBz + moves[2][0] * dl
+        dV_B = moves[0][1] * dBx + moves[1][1] * dBz + moves[2][1] * dl
+        dl0 = moves[0][2] * dBx + moves[1][2] * dBz + moves[2][2] * dl
         dq = (dH - q * dBx) / clamped
         dhx = dq * dx + q * px
         dhy = dq * dy + q * py
@@ -910,7 +921,7 @@ def irvine_row_softening(Bx, Bz, H, w, asymptote, softening, offset):
             )  # fmt: skip
         # Then once more round, so that the derivatives are taken at the solution.
         converged = abs(dV) <= 1e-8 * min(T_A, T_B) and abs(dl) <= 1e-8 * l0
-        converged = converged or abs(rx) + abs(rz) <= 1e-15 * L
+        converged = converged or (abs(rx) + abs(rz) <= 1e-15 * L and abs(rx) <= 1e-9 * Bx)
         step = 1.0
         if dl < -0.5 * l0:
             step = -0.5 * l0 / dl

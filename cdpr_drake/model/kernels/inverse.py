@@ -1,8 +1,12 @@
-"""Inverse kinematics (eqs. 6 to 9) with minimum-norm statics, in real or complex numbers.
+"""Inverse kinematics (eqs. 6 to 9) with statics by a rule, in real or complex numbers.
 
-Arguments in common: model, order: the cable model's index and the order of its series; pose (6,)
-[roll, pitch, yaw, x, y, z]; points, body, stiffness: as in `model.arrays`; out (k,) [m] and T (k,)
-[N]: results; jacobian (k, 6): of out.
+Arguments in common: model, order: the cable model's index and the order of its series; rule: see
+below; pose (6,) [roll, pitch, yaw, x, y, z]; points, body, stiffness: as in `model.arrays`; limits
+(3,): lowest, highest, preferred chord tension [N]; A (6, k): wrench matrix; load (6,): wrench to
+balance; out (k,) [m] and T (k,) [N]: results; jacobian (k, 6): of out.
+
+Statuses: 0, the number of a cable that would push, RANK_DEFICIENT, INFEASIBLE where no tensions
+within the limits hold the weight, or CORNER where tensions within them have no derivative.
 """
 
 from __future__ import annotations
@@ -10,17 +14,99 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.model.kernels import jit
-from cdpr_drake.model.kernels.cable_models import length_and_row
+from cdpr_drake.model.kernels.cable_models import length_and_row_T
+from cdpr_drake.model.kernels.distribution import within_bounds
 from cdpr_drake.model.kernels.geometry import arm_and_chord, set_column, turned
-from cdpr_drake.model.kernels.servo import STEP, least_norm, rpy_matrix
+from cdpr_drake.model.kernels.servo import (
+    RANK_DEFICIENT,
+    STEP,
+    least_norm,
+    norm_weight,
+    rpy_matrix,
+    solve_symmetric,
+)
+
+LEAST, LEAST_WITHIN, CLOSEST = range(3)
+"""Rules: horizontal tensions of least norm; of least norm within the limits of the chord tensions;
+chord tensions closest to the preferred one within the limits."""
+
+INFEASIBLE, CORNER = -2, -3
 
 
 @jit
-def unstrained_lengths(model, order, pose, points, body, stiffness, out, T):
+def bounded(rule, A, load, weight, limits, T):
+    """Write chord tensions T (k,) within limits by a rule, for a wrench matrix A (6, k).
+
+    weight (k,): what squares of the tensions weigh. Found in real numbers; once more among those
+    that are free of their limits, so that a complex part follows. Returns a status.
+    """
+    k = T.shape[0]
+    low, high, wish = limits[0], limits[1], limits[2] if rule == CLOSEST else 0.0
+    A_r, load_r = np.zeros((6, k)), np.zeros(6)
+    q, t = np.ones(k), np.zeros(k)
+    for a in range(6):
+        load_r[a] = load[a].real
+        for i in range(k):
+            A_r[a, i] = A[a, i].real
+    if rule == LEAST_WITHIN:
+        for i in range(k):
+            q[i] = weight[i].real
+    ones = np.ones(k)
+    if within_bounds(A_r, load_r, low * ones, high * ones, wish * ones, q, t) != 0:
+        return INFEASIBLE
+    G = np.zeros((6, 6), T.dtype)
+    left = np.zeros(6, T.dtype)
+    free = 0
+    for a in range(6):
+        left[a] = load[a]
+    for i in range(k):
+        T[i] = t[i] + 0.0 * load[0]
+        is_free = low < t[i] < high
+        free += 1 if is_free else 0
+        held = wish if is_free else t[i]
+        for a in range(6):
+            left[a] -= A[a, i] * held
+            if is_free:
+                for b in range(a + 1):
+                    own = 1.0 if rule == CLOSEST else weight[i]
+                    G[a, b] += A[a, i] * A[b, i] / own
+    if free < 6 or not solve_symmetric(G, left):
+        return CORNER
+    for i in range(k):
+        if low < t[i] < high:
+            T[i] = wish + 0.0 * load[0]
+            own = 1.0 if rule == CLOSEST else weight[i]
+            for a in range(6):
+                T[i] += A[a, i] * left[a] / own
+    return 0
+
+
+@jit
+def tensions(rule, A, load, weight, limits, T):
+    """Write chord tensions T (k,) that balance a load (6,) by a rule; see `bounded`."""
+    k = T.shape[0]
+    if rule != CLOSEST:
+        D, b = np.zeros((6, k), T.dtype), np.zeros(6, T.dtype)
+        within = True
+        for a in range(6):
+            b[a] = load[a]
+            for i in range(k):
+                D[a, i] = A[a, i] / np.sqrt(weight[i])
+        if not least_norm(D, b, T):
+            return RANK_DEFICIENT
+        for i in range(k):
+            T[i] = T[i] / np.sqrt(weight[i])
+            within = within and limits[0] <= T[i].real <= limits[1]
+        if rule == LEAST or within:
+            return 0
+    return bounded(rule, A, load, weight, limits, T)
+
+
+@jit
+def unstrained_lengths(model, order, rule, pose, points, body, stiffness, limits, out, T):
     """Write the spans' unstrained lengths (k,) and chord tensions T (k,) at a pose (6,).
 
-    The horizontal tensions are the minimum-norm solution of the static balance (A.2). Returns 0, -1
-    at a rank below 6, or the number of a cable that would push.
+    What horizontal tensions weigh near the vertical, `servo.norm_weight` says. Returns a status.
     """
     drawing, attachment = points[0], points[1]
     k = drawing.shape[0]
@@ -30,36 +116,39 @@ def unstrained_lengths(model, order, pose, points, body, stiffness, out, T):
     D = np.zeros((6, k), pose.dtype)
     Bx = np.zeros(k, pose.dtype)
     Bz = np.zeros(k, pose.dtype)
+    weight = np.zeros(k, pose.dtype)
     load = np.zeros(6, pose.dtype)
     Gx, Gy, _Gz = turned(R, body[1:4])
     load[0], load[1], load[5] = -Gy * body[0], Gx * body[0], -body[0]
     for i in range(k):
         arm, (ax, ay, Bz[i]) = arm_and_chord(i, R, pose[3:6], drawing, attachment)
         Bx[i] = np.sqrt(ax * ax + ay * ay)
-        set_column(i, arm, (ax / Bx[i], ay / Bx[i], Bz[i] / Bx[i]), D)
-        half = 0.5 * w * np.sqrt(Bx[i] * Bx[i] + Bz[i] * Bz[i])
+        L = np.sqrt(Bx[i] * Bx[i] + Bz[i] * Bz[i])
+        ux, uy = ax / L, ay / L
+        weight[i] = norm_weight(ux * ux + uy * uy)
+        set_column(i, arm, (ux, uy, Bz[i] / L), D)
+        half = 0.5 * w * L
         load[0] -= arm[1] * half
         load[1] += arm[0] * half
         load[5] -= half
-    H = np.zeros(k, pose.dtype)
-    if not least_norm(D, load, H):
-        return -1
-    status = 0
+    status = tensions(rule, D, load, weight, limits, T)
+    if status in (RANK_DEFICIENT, INFEASIBLE):
+        return status
     for i in range(k):
-        if not H[i].real > 0.0:
+        if not T[i].real > 0.0:
             status = i + 1
             continue
-        t = Bz[i] / Bx[i]
-        T[i] = H[i] * np.sqrt(1.0 + t * t)
-        EA = stiffness[0] + 0.0 * H[i]
+        EA = stiffness[0] + 0.0 * T[i]
         if stiffness[1] != 0.0:
             EA = stiffness[0] - stiffness[1] / (T[i] + stiffness[2])
-        out[i], _, _, _ = length_and_row(model, order, Bx[i], Bz[i], H[i], w, EA)
+        out[i], _, _, _ = length_and_row_T(model, order, Bx[i], Bz[i], T[i], w, EA)
     return status
 
 
 @jit
-def unstrained_lengths_jacobian(model, order, pose, points, body, stiffness, out, T, jacobian):
+def unstrained_lengths_jacobian(
+    model, order, rule, pose, points, body, stiffness, limits, out, T, jacobian
+):
     """As `unstrained_lengths`, with the Jacobian (k, 6) with respect to the pose vector."""
     k = points.shape[1]
     zc = np.zeros(6, np.complex128)
@@ -69,7 +158,7 @@ def unstrained_lengths_jacobian(model, order, pose, points, body, stiffness, out
         zc[j] = pose[j]
     for j in range(6):
         zc[j] = zc[j] + STEP * 1j
-        status = unstrained_lengths(model, order, zc, points, body, stiffness, yc, Tc)
+        status = unstrained_lengths(model, order, rule, zc, points, body, stiffness, limits, yc, Tc)
         if status != 0:
             return status
         zc[j] = pose[j]

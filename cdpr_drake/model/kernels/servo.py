@@ -16,12 +16,19 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.model.kernels import jit
-from cdpr_drake.model.kernels.cable_models import length_and_row, run_row
+from cdpr_drake.model.kernels.cable_models import (
+    SLSM,
+    chord_tension_catenary,
+    length_and_row_T,
+    run_row,
+)
 from cdpr_drake.model.kernels.geometry import arm_and_chord, cross, set_column, turned
 
-SLSM = 3
 RANK_DEFICIENT = -1
 STEP = 1e-40
+
+STEEP2 = 4e-4
+"""Square of the cosine of the elevation above which a chord is near the vertical, by a degree."""
 
 
 @jit
@@ -126,12 +133,51 @@ def least_norm(D, b, x):
 
 
 @jit
+def norm_weight(c2):
+    """Return the square of what a chord tension weighs in the norm of the horizontal tensions.
+
+    That is c2 = c^2, with c the cosine of the chord's elevation, but above zero for chords near the
+    vertical (`STEEP2`), whose horizontal tension is none whatever they pull.
+    """
+    if c2.real < STEEP2:
+        return (c2 * c2 + STEEP2 * STEEP2) / (2.0 * STEEP2)
+    return c2
+
+
+@jit
+def chord_tension(T_A, cos_alpha, Bx, Bz, L, w):
+    """Return the chord tension: T_A cos_alpha over the chord's cosine (eq. 16), not below w L / 20.
+
+    Bx, Bz, L: of the chord [m], horizontal, up, along it.
+
+    Near the vertical, where one cosine over the other says nothing, that of the catenary with T_A.
+    """
+    c = Bx / L
+    share = (c * c / STEEP2 - 0.25) / 0.75
+    floor = 0.05 * w * L.real
+    T = floor + 0.0 * T_A
+    if share.real > 0.0:
+        measured = T_A * cos_alpha / c
+        if measured.real > floor:
+            T = measured
+    if share.real < 1.0:
+        hanging, _slack = chord_tension_catenary(Bx, Bz, T_A, w)
+        if share.real <= 0.0:
+            return hanging
+        T = hanging + share * share * (3.0 - 2.0 * share) * (T - hanging)
+    return T
+
+
+@jit
 def length_rates(model, order, R, p, twist, T_A, cos_alpha, points, body, stiffness, run, rates):
     """Write the rates of the unstrained lengths (eq. 13) for a twist [omega; v] of E in W.
 
     R, p: the pose; T_A, cos_alpha (k,): tension at the drawing points and cosine of the tangents'
     elevation there, so that H = T_A cos_alpha (eq. 16); run (k,): drum-to-eyelet runs that the law
     models (zero: it does not). Returns False when the wrench matrix has rank below 6.
+
+    Among the rates of the tensions that keep the balance those of the horizontal tensions are of
+    least norm, written in chord tensions: H' = c T' + T c'.
     """
     k = run.shape[0]
     drawing, attachment = points[0], points[1]
@@ -139,57 +185,63 @@ def length_rates(model, order, R, p, twist, T_A, cos_alpha, points, body, stiffn
     omega = (twist[0], twist[1], twist[2])
     D = np.zeros((6, k), R.dtype)
     change = np.zeros(6, R.dtype)
-    dH = np.zeros(k, R.dtype)
+    by_T = np.zeros(k, R.dtype)
+    known = np.zeros(k, R.dtype)
+    scale = np.zeros(k, R.dtype)
     for i in range(k):
         arm, (ax, ay, Bz) = arm_and_chord(i, R, p, drawing, attachment)
         Bx = np.sqrt(ax * ax + ay * ay)
         L = np.sqrt(Bx * Bx + Bz * Bz)
-        cx, cy = ax / Bx, ay / Bx
-        # Velocity of B, its components in the cable's plane and across it.
+        # Velocity of B.
         turn = cross(omega, arm)
         vx, vy, vz = twist[3] + turn[0], twist[4] + turn[1], twist[5] + turn[2]
-        dBx = cx * vx + cy * vy
-        dgamma = (cx * vy - cy * vx) / Bx
+        outwards = ax * vx + ay * vy
         tension = T_A[i] if T_A[i].real > 0.0 else 0.0 * T_A[i]
-        H = tension * cos_alpha[i]
-        slack = w * Bx.real / 20.0
-        if not H.real > slack:
-            H = slack + 0.0 * H
+        T = chord_tension(tension, cos_alpha[i], Bx, Bz, L, w)
         EA = stiffness[0] + 0.0 * tension
         if stiffness[1] != 0.0:
             EA = stiffness[0] - stiffness[1] / (tension + stiffness[2])
-        _, N1, N2, N3 = length_and_row(model, order, Bx, Bz, H, w, EA)
+        _, M1, M2, M3 = length_and_row_T(model, order, Bx, Bz, T, w, EA)
         if run[i] != 0.0:
-            M1, M2, M3 = run_row(run[i], EA, Bx, Bz, H, w)
-            N1, N2, N3 = N1 + M1, N2 + M2, N3 + M3
-        rates[i] = N1 * dBx + N2 * vz
+            N1, N2, N3 = run_row(run[i], EA, Bx, Bz, T, w)
+            M1, M2, M3 = M1 + N1, M2 + N2, M3 + N3
+        rates[i] = M2 * vz
+        if Bx != 0.0:  # else M1 is zero
+            rates[i] += M1 / Bx * outwards
         if model == SLSM and run[i] == 0.0:
             continue
-        dH[i] = N3
-        t = Bz / Bx
-        set_column(i, arm, (cx, cy, t), D)
-        # Change of theta_B = H (x_A + t z) + (w L / 2) z at constant H, and of its moment about E.
-        dL = (Bx * dBx + Bz * vz) / L
-        gx, gy = -H * cy * dgamma, H * cx * dgamma
-        gz = H * (vz - t * dBx) / Bx + 0.5 * w * dL
-        turned_moment = cross(turn, (H * cx, H * cy, H * t + 0.5 * w * L))
+        by_T[i] = M3
+        ux, uy, uz = ax / L, ay / L, Bz / L
+        # Change of theta_B = T u + (w L / 2) z at constant T, and of its moment about E.
+        dL = ux * vx + uy * vy + uz * vz
+        stiff = T / L
+        gx, gy, gz = stiff * (vx - dL * ux), stiff * (vy - dL * uy), stiff * (vz - dL * uz)
+        gz = gz + 0.5 * w * dL
+        turned_moment = cross(turn, (T * ux, T * uy, T * uz + 0.5 * w * L))
         moment = cross(arm, (gx, gy, gz))
         for a in range(3):
             change[a] += turned_moment[a] + moment[a]
         change[3] += gx
         change[4] += gy
         change[5] += gz
+        c2 = ux * ux + uy * uy
+        scale[i] = 1.0 / np.sqrt(norm_weight(c2))
+        known[i] = scale[i] * stiff * (outwards / L - c2 * dL)  # T c c' over the weight
+        set_column(i, arm, (scale[i] * ux, scale[i] * uy, scale[i] * uz), D)
     if model == SLSM and not np.any(run):
         return True
     # The weight's moment changes as G turns about E: d(EG x m g) = (omega x EG) x m g.
     turn = cross(omega, turned(R, body[1:4]))
     change[0] += turn[1] * weight
     change[1] -= turn[0] * weight
+    for a in range(6):
+        for i in range(k):
+            change[a] -= D[a, i] * known[i]
     lacking = np.zeros(k, R.dtype)
     if not least_norm(D, change, lacking):
         return False
     for i in range(k):
-        rates[i] -= dH[i] * lacking[i]
+        rates[i] -= by_T[i] * scale[i] * (lacking[i] + known[i])
     return True
 
 
