@@ -21,7 +21,7 @@ from cdpr_drake.diagrams.hall import hall_parts
 from cdpr_drake.errors import RobotFileError
 from cdpr_drake.model.digits import decimals, round_step, significant
 from cdpr_drake.model.kinematics import cable_ends
-from cdpr_drake.model.robot import CableRobot, load_robot, robot_names
+from cdpr_drake.model.robot import CableRobot, load_robot, robot_names, save_robot
 from cdpr_drake.model.room import floor_height, home_position, room_of
 from cdpr_drake.show import mode_plots, plots, replay, scene
 from cdpr_drake.show.explorer import Explorer
@@ -124,8 +124,6 @@ def test_the_floor_is_what_the_file_says_and_else_the_lowest_point() -> None:
 
 
 def test_the_floor_goes_to_yaml_and_back(tmp_path: Path) -> None:
-    from cdpr_drake.model.robot import save_robot
-
     for floor in (None, -1.25):
         save_robot(make("a rod").replace(floor=floor), tmp_path / "robot.yaml")
         assert load_robot(tmp_path / "robot.yaml").floor == floor
@@ -367,3 +365,29 @@ def test_an_answer_without_its_figure_is_an_answer(
     assert "rates_and_responses.png is not drawn: ZeroDivisionError" in told.err
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["files"] == ["summary.json"] and summary["rows"]
+
+
+# --- the command
+
+
+def test_the_explorer_begins_in_the_room_and_takes_a_rule(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    seen: list[Any] = []
+
+    class Short(Explorer):
+        def run(self, idle: float = 0.0) -> str:
+            seen.append(self.snapshot)
+            return "seen"
+
+    monkeypatch.setattr("cdpr_drake.show.explorer.Explorer", Short)
+    save_robot(make("one cable"), tmp_path / "one.yaml")
+    assert main(["explore", "--robot", str(tmp_path / "one.yaml")]) == 0
+    assert "(0.00, 0.00, 1.50) m" in capsys.readouterr().out
+    box = str(Path(__file__).parent / "outside" / "box.yaml")
+    for rule in ("minimum-norm-within-limits", "within-limits"):
+        assert main(["explore", "--robot", box, "--tensions", rule]) == 0
+    least, middle = (snapshot.answers.tension for snapshot in seen[1:])
+    assert least.max() < 500.0 < middle.mean()
+    assert main(["explore", "--tensions", "none"]) == 2
+    assert 'unknown rule "none"' in capsys.readouterr().err

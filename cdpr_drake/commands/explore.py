@@ -29,7 +29,10 @@ PORTS = (1024, 65534)
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
-    common.add_place(parser).add_argument("--tensions", **common.TENSIONS)
+    common.add_place(parser).add_argument(
+        "--tensions", type=common.parse_rule, metavar="RULE",
+        help="as `run` has them (default: minimum-norm-within-limits)",
+    )  # fmt: skip
     how = parser.add_argument_group("how it is controlled")
     how.add_argument("--cable-model", **common.CABLE_MODEL)
     how.add_argument("--gain", **common.GAIN)
@@ -78,9 +81,11 @@ def _place(options: Namespace) -> Place:
     """Return the robot where `resolve_place` has it, or in the middle of its room."""
     from cdpr_drake.errors import GeometryError, TensionError
     from cdpr_drake.model.room import home_position
+    from cdpr_drake.model.statics import DEFAULT_RULE
 
+    rule = options.tensions or DEFAULT_RULE  # in tests of the paper too: one drags away from there
     try:
-        return resolve_place(options)
+        return resolve_place(options)._replace(tensions=rule)
     except (GeometryError, TensionError):  # it can nowhere be held: the page tells why
         x, y, z = home_position(resolve_robot(options.robot)).tolist()
         options.pose = [0.0, 0.0, 0.0, x, y, z]
