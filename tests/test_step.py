@@ -373,7 +373,7 @@ def test_the_summary_keeps_the_step_its_reason_and_the_doubt() -> None:
 
 def test_a_record_tells_of_a_step_that_is_not_the_usual_one() -> None:
     assert "steps" not in repr(run(setup_of_test(4, noise=False, until=0.1)).record)
-    assert " with steps of 1.11 ms" in repr(run(short_move("acrobot", until=0.1)).record)
+    assert " with steps of 1.43 ms" in repr(run(short_move("acrobot", until=0.1)).record)
 
 
 @pytest.fixture
@@ -401,7 +401,7 @@ def test_run_tells_the_step_where_it_is_not_the_usual_one(
 ) -> None:
     argv = ["run", "--controller", "vbc", "--no-replay"]
     out, err, summary = told_by([*argv, "--robot", "acrobot"], capsys)
-    assert "The integrator's step is 1.11 ms, for a mode at " in out and "coarse" not in err
+    assert "The integrator's step is 1.43 ms, for a mode at " in out and "coarse" not in err
     assert {run["step_decided_by"] for run in summary["runs"].values()} == {"modes"}
     out, err, summary = told_by(argv, capsys)
     assert "integrator" not in out + err
