@@ -11,6 +11,7 @@ from cdpr_drake.errors import GeometryError, TensionError
 from cdpr_drake.model.distribution import minimum_norm_within
 from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.room import floor_height
 from cdpr_drake.model.rotations import Array
 from cdpr_drake.model.statics import check_rank, weight_wrench, what_limits_allow, wrench_matrix
 
@@ -33,7 +34,9 @@ def room(robot: CableRobot) -> tuple[Array, Array]:
         robot: the robot.
     """
     low, high = robot.drawing_points.min(axis=0), robot.drawing_points.max(axis=0)
-    low[2] = min(low[2], high[2] - DEPTH * np.max(high[:2] - low[:2]))
+    side = float(np.max(high[:2] - low[:2]))
+    # On one vertical line, drawing points say nothing of how deep the room is.
+    low[2] = min(low[2], high[2] - DEPTH * side if side > 0.0 else floor_height(robot))
     points = robot.attachment_points
     first, last = low - points.min(axis=0), high - points.max(axis=0)
     middle = 0.5 * (first + last)
