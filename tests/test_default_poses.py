@@ -65,10 +65,12 @@ def test_a_cell_is_feasible_if_a_linear_programme_says_so(robot: CableRobot) -> 
     np.testing.assert_array_equal(np.array(told)[clear], margins[clear] > 0.0)
 
 
+@pytest.mark.parametrize("floor", [None, 0.0])
 @pytest.mark.parametrize("name", ["cogiro-22m", "ipanema-2", "acrobot"])
-def test_where_the_world_has_its_origin_does_not_matter(name: str) -> None:
-    robot, shift = load_robot(name), np.array([3.0, -2.0, -50.0])
-    moved = robot.replace(drawing_points=robot.drawing_points + shift)
+def test_where_the_world_has_its_origin_does_not_matter(name: str, floor: float | None) -> None:
+    robot, shift = load_robot(name).replace(floor=floor), np.array([3.0, -2.0, -50.0])
+    lifted = None if robot.floor is None else robot.floor + shift[2]
+    moved = robot.replace(drawing_points=robot.drawing_points + shift, floor=lifted)
     expected = middle_of_workspace(robot).translation() + shift
     np.testing.assert_allclose(middle_of_workspace(moved).translation(), expected, atol=1e-9)
 

@@ -18,25 +18,18 @@ from cdpr_drake.model.statics import check_rank, weight_wrench, what_limits_allo
 CELLS = 9
 """Along each axis of the room."""
 
-DEPTH = 0.4
-"""Of the room below the highest drawing point, over its longer side in plan, where nothing is below
-and no floor is given."""
-
 
 def room(robot: CableRobot) -> tuple[Array, Array]:
-    """Return the lowest and highest p_WP (3,) [m] with the level platform between drawing points.
+    """Return the lowest and highest p_WP (3,) [m] of the level platform amid the drawing points.
 
-    The room reaches down to the lowest drawing point; under drawing points that are all high up, as
-    those of suspended robots, by `DEPTH` of its longer side. Where the platform is larger than the
-    room along an axis, both are the place where it sticks out as far at either side.
+    The room stands on the floor (`model.room`). Where the platform is larger than the room along an
+    axis, both are the place where it sticks out as far at either side.
 
     Args:
         robot: the robot.
     """
     low, high = robot.drawing_points.min(axis=0), robot.drawing_points.max(axis=0)
-    side = float(np.max(high[:2] - low[:2]))
-    # On one vertical line, drawing points say nothing of how deep the room is.
-    low[2] = min(low[2], high[2] - DEPTH * side if side > 0.0 else floor_height(robot))
+    low[2] = floor_height(robot)
     points = robot.attachment_points
     first, last = low - points.min(axis=0), high - points.max(axis=0)
     middle = 0.5 * (first + last)
