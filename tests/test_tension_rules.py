@@ -7,11 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cdpr_drake.analysis import level_workspace
+from cdpr_drake.analysis import level_workspace, middle_of_workspace
 from cdpr_drake.errors import TensionError
+from cdpr_drake.model.equilibrium import rest_state
+from cdpr_drake.model.inverse_kinematics import InverseKinematics
 from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.robot import CableRobot, load_robot, robot_names
-from cdpr_drake.model.rotations import as_pose
+from cdpr_drake.model.rotations import as_pose, pose_to_vector
 from cdpr_drake.model.statics import (
     tension_distribution,
     weight_wrench,
@@ -21,6 +23,34 @@ from cdpr_drake.model.statics import (
 ROBOTS = (*robot_names(), str(Path(__file__).parent / "outside" / "box.yaml"))
 MOVES, LOOKS = 100, 3
 STEP = 1e-6  # m
+
+
+@pytest.mark.parametrize("name", ["ipanema-2", "segesta-10", "acrobot", "cogiro"])
+def test_a_tension_may_be_preferred_by_file_or_by_rule(name: str) -> None:
+    robot = load_robot(name)
+    pose = middle_of_workspace(robot)
+    low, high = robot.cable.limits
+    for share in (0.1, 0.6):
+        wish = round(low + share * (high - low), 1)
+        own = robot.replace(cable=robot.cable.replace(preferred_tension=wish))
+        by_file = tension_distribution(own, pose, "within limits")
+        by_rule = tension_distribution(robot, pose, f"within limits, close to {wish:g} N")
+        np.testing.assert_array_equal(by_file, by_rule)
+        matrix, wrench = _balance(robot, pose_to_vector(pose))
+        np.testing.assert_allclose(matrix @ by_rule, wrench, atol=1e-9 * np.abs(wrench).max())
+        # Along all that changes the internal tensions alone, none is closer.
+        null = np.linalg.svd(matrix)[2][6:].T
+        free = np.all((by_rule > low + 1e-6) & (by_rule < high - 1e-6))
+        if free:
+            np.testing.assert_allclose(null.T @ (by_rule - wish), 0.0, atol=1e-6 * high)
+        state = rest_state(robot, pose, f"within limits, close to {wish:g} N")
+        np.testing.assert_allclose(state.chord_tension, by_rule, rtol=1e-3)
+        lengths = InverseKinematics(own, "ECM", rule="within limits").lengths(pose)
+        same = InverseKinematics(robot, "ECM", rule=f"within limits, close to {wish:g} N")
+        np.testing.assert_array_equal(same.lengths(pose), lengths)
+    for rule in ("within limits, close to -3 N", "close to 3 N", "least"):
+        with pytest.raises(ValueError, match="unknown rule"):
+            tension_distribution(robot, pose, rule)
 
 
 def _balance(robot: CableRobot, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

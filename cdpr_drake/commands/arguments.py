@@ -96,7 +96,13 @@ def parse_models(text: str) -> list[str]:
 
 
 def parse_rule(text: str) -> str:
-    """Return a rule for tensions of a `text` that may have hyphens, to need no quotes."""
+    """Return a rule for tensions of a `text` that may have hyphens, to need no quotes.
+
+    A number is the tension [N] to stay close to, within the limits.
+    """
+    values = _numbers(text)
+    if len(values) == 1 and values[0] >= 0.0:
+        return f"within limits, close to {values[0]:g} N"
     return text.strip().lower().replace("-", " ")
 
 
@@ -138,8 +144,9 @@ ROBOTS = _taking("NAME|FILE,...", type=parse_names, action="extend")
 PAYLOAD = _taking("KG", "mass carried (default: the test's; else the robot's)", type=float)
 POSE = _taking("X,Y,Z[,R,P,Y]", type=parse_pose)
 TENSIONS = _taking("RULE", "of those that balance the platform: minimum-norm-within-limits; "
-                   "minimum-norm, whatever the limits; within-limits, closest to the preferred "
-                   "tension (default: the first, and for the paper's tests its own rule, the "
+                   "minimum-norm, whatever the limits; within-limits, closest to the robot's "
+                   "preferred tension, or the middle; a number, closest to that tension [N] "
+                   "(default: the first, and for the paper's tests its own rule, the "
                    "second)", type=parse_rule)  # fmt: skip
 CABLE_MODEL = _taking("MODEL", f"of the law: {MODELS} (default: SCMWE)",
                       type=parse_model, default="SCMWE")  # fmt: skip

@@ -17,6 +17,7 @@ from cdpr_drake.model.statics import (
     MINIMUM_NORM,
     check_rule,
     distribute,
+    preferred_tension,
     weight_wrench,
     what_limits_allow,
     wrench_matrix,
@@ -55,13 +56,11 @@ class InverseKinematics:
         check_rule(rule)
         self.robot, self.cable_model, self.order, self.rule = robot, cable_model, order, rule
         self._kernel = kernel
-        cable, arrays = robot.cable, RobotArrays(robot)
-        low, high = cable.limits
-        wish = 0.5 * (low + high) if cable.preferred_tension is None else cable.preferred_tension
+        arrays = RobotArrays(robot)
         known = {MINIMUM_NORM: kernel.LEAST, DEFAULT_RULE: kernel.LEAST_WITHIN}
         index = cable_model_index(cable_model_name(cable_model))
         self._head = (index, order, known.get(rule, kernel.CLOSEST))
-        limits = np.array([low, high, wish])
+        limits = np.array([*robot.cable.limits, preferred_tension(robot, rule)])
         self._tail = (arrays.points, arrays.body, arrays.stiffness, limits)
 
     def lengths(self, pose: RigidTransform | ArrayLike) -> Array:

@@ -13,6 +13,8 @@ The pull of the cables on the platform is - W t.
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
@@ -29,7 +31,10 @@ CLOSEST = "within limits"
 RULES = (DEFAULT_RULE, MINIMUM_NORM, CLOSEST)
 """How tensions are chosen among those that balance the platform: of least norm within the robot's
 limits, which is continuous in the pose; of least norm whatever the limits, the paper's rule; within
-the limits and closest to the preferred tension, or else to their middle."""
+the limits and closest to the robot's preferred tension, or else to their middle. A number says
+which tension is preferred instead: "within limits, close to 120 N"."""
+
+_CLOSE_TO = re.compile(rf"{CLOSEST}, close to (\d+(?:\.\d*)?) N")
 
 
 def wrench_at(arm: Array, force: Array) -> Array:
@@ -230,11 +235,8 @@ def distribute(
         return least
     if rule == DEFAULT_RULE and np.all(least >= low) and np.all(least <= high):
         return least
-    preferred = 0.0 if rule == DEFAULT_RULE else robot.cable.preferred_tension
     try:
-        return bounded_distribution(
-            matrix, wrench, low, high, 0.5 * (low + high) if preferred is None else preferred
-        )
+        return bounded_distribution(matrix, wrench, low, high, preferred_tension(robot, rule))
     except TensionError:
         worst = int(np.argmax(np.maximum(low - least, least - high)))
         raise TensionError(
@@ -244,9 +246,26 @@ def distribute(
 
 
 def check_rule(rule: str) -> None:
-    """Raise ValueError unless a `rule` is one of `RULES`."""
-    if rule not in RULES:
-        raise ValueError(f'unknown rule "{rule}"; known are {", ".join(RULES)}')
+    """Raise ValueError unless a `rule` is one of `RULES`, or says what tension is preferred."""
+    if rule not in RULES and not _CLOSE_TO.fullmatch(rule):
+        raise ValueError(
+            f'unknown rule "{rule}"; known are {", ".join(RULES)}, and "{CLOSEST}, close to 120 N"'
+        )
+
+
+def preferred_tension(robot: CableRobot, rule: str) -> float:
+    """Return the tension [N] that a rule within the limits stays close to.
+
+    Args:
+        robot: the robot, for its preferred tension and its limits.
+        rule: one of `RULES`.
+    """
+    if rule == DEFAULT_RULE:
+        return 0.0
+    if found := _CLOSE_TO.fullmatch(rule):
+        return float(found[1])
+    own, limits = robot.cable.preferred_tension, robot.cable.limits
+    return 0.5 * sum(limits) if own is None else own
 
 
 def what_limits_allow(robot: CableRobot, matrix: Array, wrench: Array) -> str:
