@@ -21,6 +21,7 @@ from cdpr_drake.batch import Outcome, sweep
 from cdpr_drake.diagrams import ModelledSensing, TargetSensing
 from cdpr_drake.diagrams.step import StepWarning
 from cdpr_drake.model.robot import CableRobot, load_robot
+from cdpr_drake.model.statics import DEFAULT_RULE
 from cdpr_drake.runs.moves import move_near_the_middle
 from cdpr_drake.runs.paper_tests import paper_test, paper_tests
 from cdpr_drake.runs.running import prepare, run
@@ -154,6 +155,7 @@ def ablation_setup(
     gain: float,
     unknown_payload: float = 0.0,
     max_step: float | None = None,
+    tensions: str = DEFAULT_RULE,
 ) -> Setup:
     """Return the run of a robot with some of its sensors.
 
@@ -164,6 +166,7 @@ def ablation_setup(
         gain: lambda [1/s].
         unknown_payload: [kg] that the robot carries and the controller does not know of.
         max_step: of the integrator [s]; if None, the robot's modes decide.
+        tensions: at the start, one of `model.statics.RULES`.
     """
     cameras = robot.cameras.replace(
         pose_cameras=robot.cameras.pose_cameras[: sensors.pose_cameras], pixel_bias_seed=seed
@@ -182,6 +185,7 @@ def ablation_setup(
         sensing=ModelledSensing(modelled=sensors.modelled, cameras=TargetSensing()),
         seed=seed,
         max_step=max_step,
+        tensions=tensions,
     )
 
 
@@ -207,6 +211,7 @@ def ablate(
     gain: float | None = None,
     unknown_payload: float = 0.0,
     max_step: float | None = None,
+    tensions: str = DEFAULT_RULE,
     jobs: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Ablation]:
@@ -218,6 +223,7 @@ def ablate(
         gain: lambda [1/s]; `suitable_gain` if None.
         unknown_payload: [kg] that the robots carry and the controllers do not know of.
         max_step: of the integrator [s]; if None, each robot's modes decide.
+        tensions: at the start, one of `model.statics.RULES`.
         jobs: processes at a time; as many as cores if None.
         progress: called with the number of runs done and of all.
 
@@ -227,7 +233,7 @@ def ablate(
     """
     if seeds < 1:
         raise ValueError(f"at least one seed is needed, got {seeds}")
-    plans = [_plan(name, gain, unknown_payload, max_step) for name in robots]
+    plans = [_plan(name, gain, unknown_payload, max_step, tensions) for name in robots]
     cases = [
         {
             "robot": name,
@@ -235,6 +241,7 @@ def ablate(
             "gain": setup.gain,
             "unknown_payload": unknown_payload,
             "max_step": max_step,
+            "tensions": tensions,
             "seed": seed,
         }
         for name, (setup, sets, _) in zip(robots, plans, strict=True)
@@ -266,6 +273,7 @@ def ablation_case(
     unknown_payload: float,
     seed: int,
     max_step: float | None = None,
+    tensions: str = DEFAULT_RULE,
 ) -> dict[str, float]:
     """Return the metrics of one run; NaN for a run that did not settle.
 
@@ -276,10 +284,11 @@ def ablation_case(
         unknown_payload: [kg].
         seed: of noise and bias.
         max_step: of the integrator [s].
+        tensions: at the start.
     """
     true = load_robot(robot)
     sensors = next(s for s in sensor_sets(true) if s.label == label)
-    setup = ablation_setup(true, sensors, seed, gain, unknown_payload, max_step)
+    setup = ablation_setup(true, sensors, seed, gain, unknown_payload, max_step, tensions)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StepWarning)  # said once, of the first run
         summary = run(setup).summary
@@ -294,7 +303,7 @@ def _move(robot: CableRobot) -> Any:
 
 
 def _plan(
-    name: str, gain: float | None, unknown_payload: float, max_step: float | None
+    name: str, gain: float | None, unknown_payload: float, max_step: float | None, tensions: str
 ) -> tuple[Setup, tuple[SensorSet, ...], DefaultGain | None]:
     """Return the first run of a robot, which works, all sets of sensors, and why that gain."""
     robot = load_robot(name)
@@ -302,7 +311,7 @@ def _plan(
     chosen = suitable_gain(robot, unknown_payload) if gain is None else None
     pace = gain if chosen is None else chosen.gain
     assert pace is not None
-    setup = ablation_setup(robot, sets[0], 0, pace, unknown_payload, max_step)
+    setup = ablation_setup(robot, sets[0], 0, pace, unknown_payload, max_step, tensions)
     prepare(setup)
     return setup, sets, chosen
 

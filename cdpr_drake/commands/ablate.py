@@ -25,6 +25,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
     what.add_argument("--robot", **common.ROBOTS,
                       help="built-in robots, or robot files, with cameras (default: "
                       f"{','.join(ROBOTS)})")  # fmt: skip
+    what.add_argument("--tensions", **common.SAME_TENSIONS)
     what.add_argument("--seeds", type=common.parse_count, default=4, metavar="N",
                       help="runs of each set of sensors, each with noise and bias of its own "
                       "(default: 4)")  # fmt: skip
@@ -41,6 +42,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 def _ablate(options: Namespace) -> int:
     from cdpr_drake.batch.ablation import ablate
+    from cdpr_drake.model.statics import DEFAULT_RULE
 
     robots = list(dict.fromkeys(options.robot or ROBOTS))
     progress = CaseProgress()
@@ -51,6 +53,7 @@ def _ablate(options: Namespace) -> int:
             gain=options.gain,
             unknown_payload=options.unknown_payload,
             max_step=options.max_step,
+            tensions=options.tensions or DEFAULT_RULE,
             jobs=options.jobs,
             progress=progress,
         )

@@ -148,6 +148,8 @@ TENSIONS = _taking("RULE", "of those that balance the platform: minimum-norm-wit
                    "preferred tension, or the middle; a number, closest to that tension [N] "
                    "(default: the first, and for the paper's tests its own rule, the "
                    "second)", type=parse_rule)  # fmt: skip
+SAME_TENSIONS = _taking("RULE", "as `run` has them (default: minimum-norm-within-limits)",
+                        type=parse_rule)  # fmt: skip
 CABLE_MODEL = _taking("MODEL", f"of the law: {MODELS} (default: SCMWE)",
                       type=parse_model, default="SCMWE")  # fmt: skip
 CABLE_MODELS = _taking("MODEL,...", type=parse_models, action="extend")

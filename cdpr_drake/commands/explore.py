@@ -29,10 +29,7 @@ PORTS = (1024, 65534)
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
-    common.add_place(parser).add_argument(
-        "--tensions", type=common.parse_rule, metavar="RULE",
-        help="as `run` has them (default: minimum-norm-within-limits)",
-    )  # fmt: skip
+    common.add_place(parser).add_argument("--tensions", **common.SAME_TENSIONS)
     how = parser.add_argument_group("how it is controlled")
     how.add_argument("--cable-model", **common.CABLE_MODEL)
     how.add_argument("--gain", **common.GAIN)

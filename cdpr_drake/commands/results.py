@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from cdpr_drake import __version__
 from cdpr_drake.commands.resolve import pose_values
 from cdpr_drake.commands.terminal import Column, fitting, print_wrapped, table, width_of
-from cdpr_drake.model.digits import significant
+from cdpr_drake.model.digits import decimals, significant
 
 if TYPE_CHECKING:
     from cdpr_drake.runs import Run, Setup
@@ -111,7 +111,10 @@ def _columns(runs: Sequence[Run]) -> list[Column]:
     results = [r.summary for r in runs]
 
     def cells(attribute: str, digits: int) -> list[str]:
+        """Return an entry of each run, with more digits where the largest would have none."""
         values = [getattr(summary, attribute) for summary in results]
+        largest = max((abs(value) for value in values if value is not None), default=0.0)
+        digits = max(digits, min(decimals(largest, 1), digits + 3))
         return ["-" if value is None else f"{value:.{digits}f}" for value in values]
 
     # fmt: off
