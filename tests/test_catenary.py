@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import pickle
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -937,3 +938,26 @@ def test_compiled_and_uncompiled_agree(tmp_path: Path) -> None:
     command = [sys.executable, "-c", UNCOMPILED, str(Path(__file__).parent), str(file)]
     subprocess.run(command, check=True, env=environment, timeout=120)
     np.testing.assert_allclose(here, np.load(file), rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("changes", "name"),
+    [
+        ({"w": -1.0}, "w must be from 0"),
+        ({"w": np.nan}, "w must be from 0"),
+        ({"w": 1e12}, "w must be from 0"),
+        ({"stiffness": np.inf}, "stiffness must be from"),
+        ({"stiffness": 1e18}, "stiffness must be from"),
+        ({"stiffness": -3.0}, "stiffness must be from"),
+        ({"length": np.nan}, "length must be from"),
+        ({"length": 1e12}, "length must be from"),
+        ({"drum_run": -1.0}, "drum_run must be from"),
+        ({"p_AB": [[0.0, 0.0, 0.0]]}, "p_AB, the chord, must be from"),
+        ({"drum_run": 6.0}, "no elastic catenary of unstrained length 5.1 m, of which 6 m run"),
+    ],
+)
+def test_what_has_no_catenary_is_named(changes: dict, name: str) -> None:
+    good = {"p_AB": [[3.0, 4.0, 0.0]], "length": 5.1, "w": 0.6, "stiffness": 5e5, "drum_run": 0.0}
+    elastic_catenary(**good)
+    with pytest.raises(CableError, match=re.escape(name)):
+        elastic_catenary(**{**good, **changes})

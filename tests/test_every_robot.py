@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from cdpr_drake.analysis import gain_matrix
+from cdpr_drake.commands.results import beyond_limits
 from cdpr_drake.diagrams import JointSpaceLoop, VisionLoop
 from cdpr_drake.model.robot import load_robot, robot_names
 from cdpr_drake.runs.moves import move_near_the_middle
@@ -58,3 +61,19 @@ def test_the_step_is_fine_enough(name: str) -> None:
     assert np.linalg.norm(apart[:, 3:], axis=1).max() <= 5e-5
     tension = fine.record["tension_at_drawing_point"]
     assert np.abs(usual.record["tension_at_drawing_point"] / tension - 1.0).max() <= 0.01
+
+
+def test_tensions_that_leave_the_limits_are_told() -> None:
+    """Limits so narrow that the move leaves them on both sides, and the robot's own."""
+    found = made("ipanema-2", "VBC", gain=0.5, until=3.0)
+    assert beyond_limits(found) == ""
+    tension = found.record["tension_at_drawing_point"]
+    rest = tension[0]
+    robot = found.setup.robot
+    cable = robot.cable.replace(min_tension=rest.min(), max_tension=rest.max(), tension_margin=None)
+    narrow = found.setup.replace(robot=robot.replace(cable=cable))
+    told = beyond_limits(dataclasses.replace(found, setup=narrow))
+    low, high = told.split("; ")
+    assert low.startswith(f"tension below the robot's {rest.min():g} N in cable ")
+    assert high.startswith(f"tension above the robot's {rest.max():g} N in cable ")
+    assert low.endswith(" N") and "first at" in low

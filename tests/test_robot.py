@@ -598,6 +598,14 @@ def test_a_robot_made_in_code_is_checked_too(cogiro: CableRobot) -> None:
         cogiro.replace(sources={"cabel": "me"})
 
 
+def test_a_stiffness_beyond_all_numbers_is_named(cogiro: CableRobot) -> None:
+    for stiffness in (1e18, float("inf")):
+        with pytest.raises(RobotFileError, match=r"cable\.stiffness"):
+            cogiro.replace(
+                cable=cogiro.cable.replace(stiffness=AxialStiffness(asymptote=stiffness))
+            )
+
+
 def test_a_density_that_is_not_steel_s_is_warned_of(cogiro: CableRobot) -> None:
     density = 0.9 * 7850.0 * cogiro.cable.section
     cogiro.replace(cable=cogiro.cable.replace(linear_density=1.001 * density))

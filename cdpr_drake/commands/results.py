@@ -49,7 +49,14 @@ def summarize(name: str, setup: Setup, runs: Sequence[Run]) -> dict[str, Any]:
         "calibrated": setup.loop.believed is not None,
         "noise": setup.noise,
         "seed": setup.seed,
-        "runs": {r.setup.label: {**_law(r.setup), **r.summary.to_dict()} for r in runs},
+        "runs": {
+            r.setup.label: {
+                **_law(r.setup),
+                **r.summary.to_dict(),
+                "beyond_limits": beyond_limits(r),
+            }
+            for r in runs
+        },
     }
 
 
@@ -92,8 +99,35 @@ def print_results(runs: Sequence[Run]) -> None:
                 f"{r.setup.label}: steps of {1e3 * step.size:.3g} ms from {step.since:.3g} s on, "
                 f"for {step.mode}."
             )
+        if text := beyond_limits(r):
+            print_wrapped(f"{r.setup.label}: {text}.")
         for cable, time in sorted(r.summary.slack_cables.items()):
             print_wrapped(f"{r.setup.label}: cable {cable} went slack at {time:.1f} s.")
+
+
+def beyond_limits(result: Run) -> str:
+    """Return in words which cables leave the robot's limits by more than 1 %, and when first.
+
+    Args:
+        result: a run.
+    """
+    import numpy as np
+
+    cable, time = result.setup.robot.cable, result.record.time
+    tension = result.record["tension_at_drawing_point"]
+    found = []
+    for which, limit, is_beyond, worst in (
+        ("below", cable.min_tension, tension < 0.99 * cable.min_tension, tension.min()),
+        ("above", cable.max_tension, tension > 1.01 * cable.max_tension, tension.max()),
+    ):
+        cables = ", ".join(str(i + 1) for i in np.flatnonzero(is_beyond.any(axis=0)))
+        if cables:
+            first = time[is_beyond.any(axis=1).argmax()]
+            found.append(
+                f"tension {which} the robot's {limit:g} N in cable {cables}, first at "
+                f"{first:.3g} s, at worst {significant(worst)} N"
+            )
+    return "; ".join(found)
 
 
 def _losses(result: Run) -> str:

@@ -79,12 +79,7 @@ def elastic_catenary(
         status, jacobian = _solve_at_rest(p[part], length[part], w, law, run[part], out[part])
         if status:
             i = start + status - 1
-            raise CableError(
-                i + 1,
-                None,
-                f"no elastic catenary of unstrained length {length[i]:.6g} m, of which "
-                f"{run[i]:.6g} m run from the drum, over a chord of {np.linalg.norm(p[i]):.6g} m",
-            )
+            raise CableError(i + 1, None, _why_none(p[i], length[i], w, law, run[i]))
         by_position[part], by_length[part] = jacobian[:, :3, :3], jacobian[:, :3, 6]
     return CableState(
         force_on_platform=out[:, :3],
@@ -97,6 +92,34 @@ def elastic_catenary(
         unstrained_span_length=out[:, 13],
         position_stiffness=by_position,
         length_stiffness=by_length,
+    )
+
+
+def _why_none(p_AB: Array, length: float, w: float, law: Array, run: float) -> str:
+    """Return why a cable has no catenary: the number that is out of range, or all that matter."""
+    from cdpr_drake.model.kernels.catenary import (
+        MAX_LENGTH,
+        MAX_STIFFNESS,
+        MAX_WEIGHT,
+        MIN_LENGTH,
+        MIN_STIFFNESS,
+    )
+
+    chord = float(np.linalg.norm(p_AB))
+    at_rest = law[0] - (law[1] / law[2] if law[1] else 0.0)
+    for name, value, unit, least, most in (
+        ("p_AB, the chord,", chord, "m", MIN_LENGTH, MAX_LENGTH),
+        ("length", max(length, 0.0), "m", 0.0, MAX_LENGTH),  # too little is said below
+        ("w", w, "N/m", 0.0, MAX_WEIGHT),
+        ("stiffness", law[0], "N", MIN_STIFFNESS, MAX_STIFFNESS),
+        ("stiffness at no tension", at_rest, "N", MIN_STIFFNESS, MAX_STIFFNESS),
+        ("drum_run", run, "m", 0.0, MAX_LENGTH),
+    ):
+        if not least <= value <= most:
+            return f"{name} must be from {least:g} to {most:g} {unit}, got {value:g}"
+    return (
+        f"no elastic catenary of unstrained length {length:.6g} m, of which {run:.6g} m run from "
+        f"the drum, over a chord of {chord:.6g} m"
     )
 
 

@@ -15,6 +15,8 @@ from cdpr_drake.model.vision.cameras import camera_problems
 if TYPE_CHECKING:
     from cdpr_drake.model.robot import CableRobot
 
+_STIFFEST = 1e15  # N, above which squares would leave the range of numbers
+
 _STEEL, _FIBRE = 7850.0, (500.0, 1500.0)  # kg/m3, of ropes of fibres over their gross section
 
 Problems = Iterator[tuple[str, str]]
@@ -197,6 +199,9 @@ def _cable(robot: CableRobot) -> Problems:
     cable = robot.cable
     if cable.stiffness(0.0) <= 0.0:
         yield "cable.stiffness", f"must be positive at no tension, got {cable.stiffness(0.0):g} N"
+    if cable.stiffness.asymptote > _STIFFEST:
+        got = f"got {cable.stiffness.asymptote:g} N"
+        yield "cable.stiffness", f"must not exceed {_STIFFEST:g} N, {got}"
     circle = 0.25 * math.pi * cable.diameter**2
     if cable.section > circle:
         yield "cable.section", f"{cable.section:g} m2 exceeds the circle's, {circle:g} m2"
