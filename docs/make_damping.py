@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydrake.math import RigidTransform
 
 from cdpr_drake.analysis import gain_limit, gain_limit_band, platform_modes
 from cdpr_drake.model.robot import CableRobot, load_robot
-from cdpr_drake.runs.moves import move_near_the_middle
 from cdpr_drake.runs.paper_tests import paper_test, paper_tests
 
 DOCS = Path(__file__).resolve().parent
@@ -44,6 +44,22 @@ class Place:
     pose: RigidTransform
 
 
+def low_move(robot: CableRobot) -> tuple[RigidTransform, RigidTransform]:
+    """Return X_WP at the ends of version 0.1's short move, low in the room.
+
+    It starts under the centroid of the drawing points at 30 % of their height, rises by 10 % of it
+    and moves along x by 5 % of the room's length.
+
+    Args:
+        robot: the robot.
+    """
+    points = robot.drawing_points
+    centre, height = points.mean(axis=0), float(points[:, 2].max())
+    start = np.array([centre[0], centre[1], 0.3 * height])
+    shift = np.array([0.05 * float(np.ptp(points[:, 0])), 0.0, 0.1 * height])
+    return RigidTransform(start), RigidTransform(start + shift)
+
+
 def places() -> Iterator[Place]:
     """Yield all rows of the table: the paper's on CoGiRo, moves near the middle, Table 7's ends."""
     cogiro = load_robot(paper_tests().robot)
@@ -57,7 +73,7 @@ def places() -> Iterator[Place]:
         )
     for name in ("cogiro-22m", "cogiro-37m", "cogiro-98m"):
         robot = load_robot(name)
-        for end, pose in zip(ENDS, move_near_the_middle(robot), strict=True):
+        for end, pose in zip(ENDS, low_move(robot), strict=True):
             yield Place(robot_name=name, name=f"near the middle, {end}", robot=robot, pose=pose)
     for end, x in zip(ENDS, (0.0, 20.0), strict=True):
         pose = RigidTransform([x, 0.0, 0.0])
