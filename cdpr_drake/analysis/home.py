@@ -44,10 +44,13 @@ def is_wrench_feasible(robot: CableRobot, X_WP: RigidTransform) -> bool:
         X_WP: the pose.
     """
     geometry = cable_geometry(robot, X_WP)
-    matrix = wrench_matrix(geometry)
+    matrix, wrench = wrench_matrix(geometry), weight_wrench(robot, geometry)
+    low, high = robot.cable.limits
     try:
         check_rank(matrix)
-        minimum_norm_within(matrix, weight_wrench(robot, geometry), *robot.cable.limits)
+        least = np.linalg.lstsq(matrix, wrench, rcond=None)[0]  # does at most poses
+        if least.min() < low or least.max() > high:
+            minimum_norm_within(matrix, wrench, low, high)
     except (GeometryError, TensionError):
         return False
     return True
