@@ -54,6 +54,20 @@ def test_a_tension_may_be_preferred_by_file_or_by_rule(name: str) -> None:
             tension_distribution(robot, pose, rule)
 
 
+@pytest.mark.parametrize("name", ["ipanema-2", "segesta-10", "box"])
+def test_a_lower_limit_of_zero_is_named_where_a_cable_rests_on_it(name: str) -> None:
+    robot = load_robot(ROBOTS[-1] if name == "box" else name)
+    limp = robot.replace(cable=robot.cable.replace(min_tension=0.0, tension_margin=None))
+    pose = middle_of_workspace(limp)
+    assert tension_distribution(limp, pose).min() == 0.0
+    text = "lower limit of 0 N.*min_tension or cable.tension_margin above 0"
+    with pytest.raises(TensionError, match=text):
+        rest_state(limp, pose)
+    with pytest.raises(TensionError, match=text):
+        InverseKinematics(limp, "ECM").lengths(pose)
+    rest_state(limp, pose, "within limits")  # which stays away from it
+
+
 def _balance(robot: CableRobot, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the wrench matrix and the wrench that the tensions balance."""
     geometry = cable_geometry(robot, as_pose(pose))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cdpr_drake.errors import EquilibriumError
+from cdpr_drake.errors import EquilibriumError, TensionError
 from cdpr_drake.model.arrays import RobotArrays
 from cdpr_drake.model.cables import CableSet, pose_arrays
 from cdpr_drake.model.catenary import chord_tension
@@ -16,7 +16,14 @@ from cdpr_drake.model.inverse_kinematics import motor_angles
 from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, as_pose, exp_rotation
-from cdpr_drake.model.statics import DEFAULT_RULE, check_rank, distribute, wrench_at, wrench_matrix
+from cdpr_drake.model.statics import (
+    DEFAULT_RULE,
+    check_rank,
+    distribute,
+    without_tension,
+    wrench_at,
+    wrench_matrix,
+)
 from cdpr_drake.model.winch import WinchModel
 
 TOLERANCE = 1e-11
@@ -89,6 +96,8 @@ def rest_state(
     for _ in range(200):
         previous = T
         T = distribute(robot, matrix, load - upwards.T @ sag, rule, X_WP)
+        if T.min() <= 0.0:
+            raise TensionError(without_tension(int(np.argmin(T)) + 1))
         H = T * geometry.Bx / geometry.L
         for i in range(k):
             V_B[i], length[i], status = robot_length(

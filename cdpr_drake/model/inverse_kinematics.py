@@ -20,6 +20,7 @@ from cdpr_drake.model.statics import (
     preferred_tension,
     weight_wrench,
     what_limits_allow,
+    without_tension,
     wrench_matrix,
 )
 
@@ -112,8 +113,11 @@ class InverseKinematics:
                 f"the desired pose {np.array2string(pose, precision=3)} is at the very edge of "
                 "what tensions within the limits can hold"
             )
+        where = f"at the desired pose {np.array2string(pose, precision=3)}"
+        if self.rule != MINIMUM_NORM:
+            raise TensionError(f"{where} {without_tension(status)}")
         raise TensionError(
-            f"at the desired pose {np.array2string(pose, precision=3)} the tensions of least "
+            f"{where} the tensions of least "
             f"norm would need cable {status} to push; "
             f"{what_limits_allow(self.robot, matrix, wrench)}"
         )

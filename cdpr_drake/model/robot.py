@@ -257,8 +257,8 @@ class CableRobot(Record):
         load_cells: the load cells.
         gain: lambda [1/s] of its control law where nobody asks for another; if None, what
             `analysis.default_gain` finds.
-        floor: height of the floor in W [m], for drawings and rendered images; if None, what
-            `model.room.floor_height` takes for it.
+        floor: height of the floor in W [m], for drawings, rendered images and default poses; if
+            None, what `model.room.floor_height` takes for it.
         sources: where the values come from, by field (`cable.section`) or group (`cable`).
         assumptions: what is assumed rather than known.
 

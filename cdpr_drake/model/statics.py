@@ -292,6 +292,14 @@ def what_limits_allow(robot: CableRobot, matrix: Array, wrench: Array) -> str:
     )
 
 
+def without_tension(cable: int) -> str:
+    """Return in words that a rule leaves a `cable` (counting from 1) at a lower limit of zero."""
+    return (
+        f"the rule for tensions leaves cable {cable} at its lower limit of 0 N, where it has no "
+        "length: cable.min_tension or cable.tension_margin above 0 keeps it taut"
+    )
+
+
 def _describe(X_WP: RigidTransform) -> str:
     x, y, z = X_WP.translation()
     angles = np.degrees(as_pose(X_WP).rotation().ToRollPitchYaw().vector())
