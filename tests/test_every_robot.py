@@ -28,6 +28,7 @@ def made(name: str, controller: str, **changes: object) -> Run:
 
 
 @pytest.mark.slow
+@pytest.mark.needs("numba")  # uncompiled, the small robots' short steps take many minutes
 @pytest.mark.parametrize("controller", LOOPS)
 @pytest.mark.parametrize("name", robot_names())
 def test_a_run_ends_where_its_gain_says(name: str, controller: str) -> None:
@@ -52,6 +53,7 @@ def test_a_run_ends_where_its_gain_says(name: str, controller: str) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.needs("numba")
 @pytest.mark.parametrize("name", ["ipanema-2", "segesta-10", "acrobot", "caroca", "cogiro-22m"])
 def test_the_step_is_fine_enough(name: str) -> None:
     """Against a run at a tenth of it, from the first moment on."""
