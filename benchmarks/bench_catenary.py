@@ -25,6 +25,7 @@ import numpy as np
 from benchmarks.harness import ROOT, Contestant, Report, Spread, interleave, positive, run
 from cdpr_drake.model.kernels import is_compiled, jit
 from cdpr_drake.model.kernels.catenary import (
+    AFRESH,
     _linearise,
     _solve,
     cable_forces,
@@ -57,7 +58,7 @@ def solve_all(rows, strains, run, softening, offset, found):
         L = math.sqrt(Bx * Bx + Bz * Bz)
         soft = softening * EA * offset
         H, V_B, l0, iterations, failed, _near, _linear = _solve(
-            Bx, Bz, L, length, run, w, EA, soft, offset
+            Bx, Bz, L, length, run, w, EA, soft, offset, AFRESH
         )
         at = _linearise(H, V_B, l0, length, run, w, EA, soft, offset)
         found[i, 0] = 1.0 if failed or not H > 0.0 else 0.0

@@ -240,7 +240,7 @@ def test_every_cable_of_a_class_is_solved(name: str, kind: str) -> None:
         (Bx, Bz, l0, w, EA), (law, run) = row, law_of(row[4], kind)
         length = l0 + run / (1 + generator.uniform(0, 0.003))
         L = math.sqrt(Bx * Bx + Bz * Bz)  # as the kernel rounds it
-        found = catenary._solve(Bx, Bz, L, length, run, w, *law)
+        found = catenary._solve(Bx, Bz, L, length, run, w, *law, catenary.AFRESH)
         worst = max(worst, check_solution(row, length, law, run, found))
         if kind == "plain":
             assert catenary.solve_catenary(Bx, Bz, l0, w, EA) == (found[0], found[1], found[3], 0)
@@ -270,7 +270,7 @@ def test_the_last_resort_is_reached_where_newton_cycles() -> None:
         ]
     )
     (Bx, Bz, l0, w, _), (law, run) = row, law_of(row[4], "softening")
-    found = catenary._solve(Bx, Bz, np.hypot(Bx, Bz), l0, run, w, *law)
+    found = catenary._solve(Bx, Bz, np.hypot(Bx, Bz), l0, run, w, *law, catenary.AFRESH)
     assert found[3] > catenary.MAX_ITERATIONS
     assert check_solution(row, l0, law, run, found) <= 1e-12
 

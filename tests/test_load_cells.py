@@ -229,6 +229,7 @@ def commanded(robot: CableRobot, name: str = "SCMWE") -> Any:
 
 @pytest.mark.parametrize("name", ["cogiro", "cogiro-22m", "cogiro-98m"])
 @pytest.mark.parametrize("state", ["taut", "light"])
+@pytest.mark.needs("numba")  # minutes without compilation
 def test_the_motor_rates_are_continuous_in_each_reading(name: str, state: str) -> None:
     """Readings from 10 to 100 N: ten times finer steps make ten times smaller jumps, no larger."""
     robot = load_robot(name)

@@ -31,7 +31,7 @@ from cdpr_drake.model.robot import (
 
 load_robot_once = cache(load_robot)  # for hypothesis, which warns of fixtures
 COGIROS = ("cogiro", "cogiro-2015-pulleys", "cogiro-22m", "cogiro-37m", "cogiro-98m")
-NAMES = ("acrobot", "caroca", *COGIROS, "ipanema-2", "segesta-10")
+NAMES = ("acrobot", "caroca", *COGIROS, "cuhk-cablerobot", "ipanema-2", "segesta-10")
 
 
 @pytest.fixture(scope="module")

@@ -73,6 +73,7 @@ def test_an_offset_alone_fits_both_numbers():
     assert np.all((low < values) & (values < high))
 
 
+@pytest.mark.needs("numba")  # minutes without compilation
 def test_the_set_of_the_runs_is_what_the_fit_finds():
     values, left = e.fit(BY_NAME["stiffening modulus"])
     stored = [assumptions("table4")[name].value for name in BY_NAME["stiffening modulus"].free]
@@ -102,6 +103,7 @@ def camera_run():
     return table4_work.camera_run(3)
 
 
+@pytest.mark.needs("numba")  # minutes without compilation
 def test_a_run_with_cameras_ends_where_statics_say(camera_run):
     np.testing.assert_allclose(camera_run["rest"][:3], camera_run["predicted"][:3], atol=0.3)
     np.testing.assert_allclose(camera_run["rest"][3:], camera_run["predicted"][3:], atol=0.01)

@@ -22,15 +22,23 @@ class RobotArrays:
 
     @cached_property
     def points(self) -> Array:
-        """Where the cables leave the frame, p_WA, and where they attach, p_PB: (2, k, 3) [m]."""
-        return np.array([self.robot.drawing_points, self.robot.attachment_points], float)
+        """Where the cables leave and attach, (4, k, 3).
+
+        Drawing points p_WA, or where the cables enter their pulleys, and attachment points p_PB
+        [m]; unit vectors along the pulleys' axes; in the first column, their radii [m], 0 for none.
+        """
+        robot = self.robot
+        radii = np.outer(robot.pulley_radii, [1.0, 0.0, 0.0])
+        return np.array(
+            [robot.drawing_points, robot.attachment_points, robot.pulley_axes, radii], float
+        )
 
     @cached_property
     def constants(self) -> Array:
         """Those of the cables, (6 + k,).
 
-        Weight w [N/m]; stiffness (3); damping time [s]; breaking load [N]; runs from drum to eyelet
-        (k) [m].
+        Weight w [N/m]; stiffness (3); damping time [s]; breaking load [N]; runs from drum to
+        drawing point (k) [m].
         """
         cable = self.robot.cable
         law = [*cable.stiffness.as_array(), cable.damping_time, cable.breaking_load]
@@ -43,7 +51,7 @@ class RobotArrays:
 
     @property
     def run(self) -> Array:
-        """The runs from drum to eyelet, unstretched, (k,) [m]."""
+        """The runs from drum to drawing point, unstretched, (k,) [m]."""
         return self.constants[6:]
 
     @cached_property

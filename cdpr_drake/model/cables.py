@@ -43,9 +43,9 @@ class CableSet:
     """
 
     def __init__(self, robot: CableRobot) -> None:
-        from cdpr_drake.model.kernels import catenary, geometry, platform
+        from cdpr_drake.model.kernels import geometry, platform, pulley
 
-        self._catenary, self._geometry, self._platform = catenary, geometry, platform
+        self._pulley, self._geometry, self._platform = pulley, geometry, platform
         self.robot = robot
         self.num_cables = robot.num_cables
         self._size = sum(packed_sizes(robot.num_cables).values())
@@ -82,23 +82,21 @@ class CableSet:
         packed, status = self(state, length, rate)
         if status:
             return packed, status, np.zeros((packed.size, 12 + 2 * k))
-        (drawing, attachment), constants = self.numbers
+        points, constants = self.numbers
         p_WB, v_WB = np.empty((k, 3)), np.empty((k, 3))
         R = RollPitchYaw(state[:3]).ToRotationMatrix().matrix()
-        self._geometry.attachment_motion(R, *state[3:].reshape(3, 3), attachment, p_WB, v_WB)
+        self._geometry.attachment_motion(R, *state[3:].reshape(3, 3), points[1], p_WB, v_WB)
         out, local = np.empty((k, WIDTH)), np.zeros((k, WIDTH, 8))
-        self._catenary.robot_forces_jacobian(
-            drawing, p_WB, v_WB, length, rate, constants, out, local
-        )
+        self._pulley.robot_forces(points, p_WB, v_WB, length, rate, constants, True, out, local)
         EB = p_WB - state[3:6]
-        points = _point_jacobian(state, EB)
+        motion = _point_jacobian(state, EB)
         jacobian = np.zeros((k, WIDTH, 12 + 2 * k))
-        jacobian[:, :, :12] = local[:, :, :6] @ points
+        jacobian[:, :, :12] = local[:, :, :6] @ motion
         cables = np.arange(k)
         jacobian[cables, :, 12 + cables] = local[:, :, 6]
         jacobian[cables, :, 12 + k + cables] = local[:, :, 7]
         torque = (skew(EB) @ jacobian[:, :3]).sum(0)
-        arm = points[:, :3].copy()
+        arm = motion[:, :3].copy()
         arm[:, :, 3:6] = 0.0
         torque[:, :12] -= (skew(out[:, :3]) @ arm).sum(0)
         parts = [torque, jacobian[:, :3].sum(0), jacobian[:, 3], jacobian[:, 4]]

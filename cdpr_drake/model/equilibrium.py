@@ -14,6 +14,7 @@ from cdpr_drake.model.cables import CableSet, pose_arrays
 from cdpr_drake.model.catenary import chord_tension
 from cdpr_drake.model.inverse_kinematics import motor_angles
 from cdpr_drake.model.kinematics import cable_geometry
+from cdpr_drake.model.pulleys import has_pulleys
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, as_pose, exp_rotation
 from cdpr_drake.model.statics import (
@@ -82,32 +83,34 @@ def rest_state(
 
     X_WP = as_pose(pose)
     geometry = cable_geometry(robot, X_WP)
-    matrix = wrench_matrix(geometry)
-    check_rank(matrix)
+    check_rank(wrench_matrix(geometry))
     external = np.zeros(6) if wrench is None else np.asarray(wrench, float)
-    load = gravity_wrench(robot, X_WP) + external
-    k, arrays = robot.num_cables, RobotArrays(robot)
-    sin_beta0 = geometry.Bz / geometry.L
-    sag = (
-        0.5 * robot.weight_per_metre * geometry.L
-    )  # V_B - T sin(beta0): the part of theta_B that is not along u
-    T, V_B, length = np.zeros(k), np.zeros(k), np.zeros(k)
-    upwards = wrench_at(geometry.EB, geometry.z)
+    weight = gravity_wrench(robot, X_WP) + external
+    k, arrays, w = robot.num_cables, RobotArrays(robot), robot.weight_per_metre
+    T, V_A, V_B, length = np.zeros(k), np.zeros(k), np.zeros(k), np.zeros(k)
+    sag = 0.5 * w * geometry.L  # V_B - T sin(beta0): the part of theta_B that is not along u
     for _ in range(200):
         previous = T
-        T = distribute(robot, matrix, load - upwards.T @ sag, rule, X_WP)
+        upwards = wrench_at(geometry.EB, geometry.z)
+        load = weight - upwards.T @ sag
+        T = distribute(robot, wrench_matrix(geometry), load, rule, X_WP)
         if T.min() <= 0.0:
             raise TensionError(without_tension(int(np.argmin(T)) + 1))
         H = T * geometry.Bx / geometry.L
+        run = arrays.run + geometry.arc
         for i in range(k):
-            V_B[i], length[i], status = robot_length(
-                geometry.Bx[i], geometry.Bz[i], H[i], arrays.run[i], arrays.constants
+            V_A[i], V_B[i], length[i], status = robot_length(
+                geometry.Bx[i], geometry.Bz[i], H[i], run[i], arrays.constants
             )
             if status:
                 raise EquilibriumError(f"cable {i + 1} has no catenary at H = {H[i]:.3g} N")
-        sag = V_B - T * sin_beta0
+        sag = V_B - T * geometry.Bz / geometry.L
         if np.max(np.abs(T - previous)) <= 1e-14 * np.max(np.abs(T)):
             break
+        if has_pulleys(robot):  # the cables leave along their tangents
+            pull = H[:, None] * geometry.x_A + V_A[:, None] * geometry.z
+            tangents = pull / np.linalg.norm(pull, axis=1, keepdims=True)
+            geometry = cable_geometry(robot, X_WP, tangents=tangents)
     unbalanced, _, out = platform_balance(robot, X_WP, length)
     residual = _relative(robot, unbalanced + external)
     if not residual <= 1e3 * TOLERANCE:
@@ -235,7 +238,8 @@ def _state(
     robot: CableRobot, X_WP: RigidTransform, length: Array, out: Array, residual: float
 ) -> RestState:
     angles, cable = motor_angles(robot, length), robot.cable
-    L, T_A, T_B = cable_geometry(robot, X_WP).L, out[:, 3], out[:, 4]
+    T_A, T_B = out[:, 3], out[:, 4]
+    L = cable_geometry(robot, X_WP, tangents=out[:, 5:8]).L
     EA = cable.stiffness(T_A)
     return RestState(
         X_WP=X_WP,

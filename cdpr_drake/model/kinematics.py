@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform
 
+from cdpr_drake.model.pulleys import Contact, contact, has_pulleys
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, as_pose, numbers, skew
 
@@ -30,11 +31,13 @@ class CableEnds(NamedTuple):
         p_WA: (k, 3) [m] where they leave.
         p_WB: (k, 3) [m] where they attach.
         EB: (k, 3) [m] from the platform's origin to the attachment points.
+        contact: with the pulleys; None for a robot that has none.
     """
 
     p_WA: Array
     p_WB: Array
     EB: Array
+    contact: Contact | None = None
 
     @property
     def chord(self) -> Array:
@@ -42,18 +45,29 @@ class CableEnds(NamedTuple):
         return self.p_WB - self.p_WA
 
 
-def cable_ends(robot: CableRobot, pose: RigidTransform | ArrayLike) -> CableEnds:
-    """Return the ends of all cables at a pose: today's cables leave from fixed points.
+def cable_ends(
+    robot: CableRobot, pose: RigidTransform | ArrayLike, tangents: ArrayLike | None = None
+) -> CableEnds:
+    """Return the ends of all cables at a pose.
 
     The one place that knows; `kernels/geometry.py` is the same for the kernels.
 
     Args:
         robot: the robot.
         pose: X_WP, or [roll, pitch, yaw, x, y, z] (rad, m).
+        tangents: (k, 3) unit vectors at the drawing points, from A to B, which say where cables
+            leave their pulleys; those of straight cables if None.
+
+    Raises:
+        GeometryError: an attachment point is inside of a pulley; names the cable.
     """
     X_WP = as_pose(pose)
     EB = robot.attachment_points @ X_WP.rotation().matrix().T
-    return CableEnds(robot.drawing_points, EB + X_WP.translation(), EB)
+    p_WB = EB + X_WP.translation()
+    if not has_pulleys(robot):
+        return CableEnds(robot.drawing_points, p_WB, EB)
+    found = contact(robot, p_WB, None if tangents is None else numbers(tangents))
+    return CableEnds(found.p_WA, p_WB, EB, found)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +76,7 @@ class CableGeometry:
 
     Attributes:
         EB: (k, 3) [m] from the platform's origin to the attachment points.
-        AB: (k, 3) [m] from the drawing points to the attachment points.
+        AB: (k, 3) [m] from where the cables leave to the attachment points.
         L: (k,) [m] length of the chord AB.
         u: (k, 3) unit vector of the chord, from A to B.
         Bx: (k,) [m] horizontal component of AB in the cable's plane, positive.
@@ -72,6 +86,8 @@ class CableGeometry:
         y_A: (k, 3) horizontal unit vector normal to the cable's plane.
         z: (3,) unit vector pointing up.
         R_FP: (3, 3) orientation of the platform in F.
+        AB_by_B: (k, 3, 3) change of AB with the attachment point: 1, but for a pulley that follows.
+        arc: (k,) [m] length of cable round the pulley.
     """
 
     EB: Array
@@ -85,10 +101,15 @@ class CableGeometry:
     y_A: Array
     z: Array
     R_FP: Array
+    AB_by_B: Array
+    arc: Array
 
 
 def cable_geometry(
-    robot: CableRobot, pose: RigidTransform | ArrayLike, R_FW: ArrayLike | None = None
+    robot: CableRobot,
+    pose: RigidTransform | ArrayLike,
+    R_FW: ArrayLike | None = None,
+    tangents: ArrayLike | None = None,
 ) -> CableGeometry:
     """Return the chords of all cables at a pose (eqs. 1, 5, 15).
 
@@ -97,9 +118,13 @@ def cable_geometry(
         pose: X_WP, or [roll, pitch, yaw, x, y, z] (rad, m).
         R_FW: (3, 3) rotation to the frame F in which vectors are wanted, e.g. that of the paper's
             F_f; W itself if None.
+        tangents: as in `cable_ends`.
+
+    Raises:
+        GeometryError: an attachment point is inside of a pulley; names the cable.
     """
     X_WP = as_pose(pose)
-    ends = cable_ends(robot, X_WP)
+    ends = cable_ends(robot, X_WP, tangents)
     AB = ends.chord
     L = np.sqrt((AB * AB).sum(axis=1))
     Bx = np.maximum(_hypot(AB[:, 0], AB[:, 1]), MIN_HORIZONTAL_SPAN * L)
@@ -108,6 +133,11 @@ def cable_geometry(
     x_A = np.column_stack([np.cos(gamma), np.sin(gamma), zero])
     y_A = np.column_stack([-np.sin(gamma), np.cos(gamma), zero])
     R = np.eye(3) if R_FW is None else np.asarray(R_FW, float)
+    AB_by_B = np.broadcast_to(np.eye(3), (len(L), 3, 3))
+    arc = np.zeros(len(L))
+    if ends.contact is not None:
+        AB_by_B = R @ (AB_by_B - ends.contact.follows(robot, ends.p_WB)) @ R.T
+        arc = robot.pulley_radii * ends.contact.theta
     return CableGeometry(
         EB=ends.EB @ R.T,
         AB=AB @ R.T,
@@ -120,6 +150,8 @@ def cable_geometry(
         y_A=y_A @ R.T,
         z=R[:, 2],
         R_FP=R @ X_WP.rotation().matrix(),
+        AB_by_B=AB_by_B,
+        arc=arc,
     )
 
 
@@ -138,6 +170,15 @@ def D_Bf(geometry: CableGeometry) -> Array:
     return np.concatenate([-skew(geometry.EB), np.broadcast_to(np.eye(3), (k, 3, 3))], axis=2)
 
 
+def D_AB(geometry: CableGeometry) -> Array:
+    """Return (k, 3, 6): rate of each chord for a twist [omega; v], that of A with it.
+
+    Args:
+        geometry: the chords at a pose.
+    """
+    return geometry.AB_by_B @ D_Bf(geometry)
+
+
 def D_u(geometry: CableGeometry) -> Array:
     """Return (k, 3, 6): rate of each chord's unit vector for a twist [omega; v] (A.1).
 
@@ -146,7 +187,7 @@ def D_u(geometry: CableGeometry) -> Array:
     """
     u = geometry.u
     normal = np.eye(3) - u[:, :, None] * u[:, None, :]
-    return normal @ D_Bf(geometry) / geometry.L[:, None, None]
+    return normal @ D_AB(geometry) / geometry.L[:, None, None]
 
 
 def gamma_row(geometry: CableGeometry) -> Array:
@@ -155,7 +196,7 @@ def gamma_row(geometry: CableGeometry) -> Array:
     Args:
         geometry: the chords at a pose.
     """
-    return np.einsum("ki,kij->kj", geometry.y_A, D_Bf(geometry)) / geometry.Bx[:, None]
+    return np.einsum("ki,kij->kj", geometry.y_A, D_AB(geometry)) / geometry.Bx[:, None]
 
 
 def D_gamma(geometry: CableGeometry) -> Array:
@@ -175,7 +216,7 @@ def D_B(geometry: CableGeometry) -> Array:
     Args:
         geometry: the chords at a pose.
     """
-    velocity = D_Bf(geometry)
+    velocity = D_AB(geometry)
     D = 0.0 * velocity
     D[:, 0] = np.einsum("ki,kij->kj", geometry.x_A, velocity)
     D[:, 2] = np.einsum("i,kij->kj", geometry.z, velocity)

@@ -130,6 +130,24 @@ class Cable(Record):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Pulleys(Record):
+    """The swivelling pulleys over which the cables leave, one for each, at the drawing points.
+
+    A pulley turns freely about an axis through the drawing point, where the cable enters it, and
+    is taken to weigh nothing. Radius 0 is an eyelet: the cable leaves the drawing point itself.
+
+    Args:
+        radius: (k,) [m], to the cable's centre line; a number stands for all cables.
+        axis: (k, 3), in W, the swivel axis as the direction in which the cable moves as it enters,
+            away from the drum: up for a pulley fed from below, down for one fed from above; of any
+            length. (3,) stands for all cables.
+    """
+
+    radius: np.ndarray = field(default_factory=lambda: np.array(0.0))
+    axis: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Winch(Record):
     """The winches, all alike, with the PID of their motors. Motor angle q > 0 pays out.
 
@@ -141,8 +159,8 @@ class Winch(Record):
         integral_gain: [N m/(rad s)].
         derivative_gain: [N m s/rad].
         torque_limit: [N m].
-        encoder_zero_length: (k,) [m], unstrained length (drum run included) at motor angle 0;
-            a number stands for all cables.
+        encoder_zero_length: (k,) [m], unstrained length, from the drum on, at motor angle 0; a
+            number stands for all cables.
         coulomb_torque: [N m], dry friction at the motor; 0 is none.
         coulomb_rate: [rad/s], motor rate over which the dry friction builds up.
         capstan_exponent: [-], friction coefficient times angle of wrap at the drawing point; 0 is
@@ -247,8 +265,10 @@ class CableRobot(Record):
         name: short name.
         description: one line.
         gravity: [m/s2].
-        drawing_points: p_WA (k, 3) [m], in W, where the cables leave the frame.
+        drawing_points: (k, 3) [m], in W, where the cables leave the frame, or enter the pulleys
+            over which they do.
         attachment_points: p_PB (k, 3) [m], in P, where they reach the platform.
+        pulleys: over which the cables leave; eyelets, if none are given.
         platform: the platform with all that always goes with it.
         payload: what it carries; its mass may be 0, and its inertia 0 for a point load.
         cable: the cables.
@@ -271,6 +291,7 @@ class CableRobot(Record):
     gravity: float
     drawing_points: np.ndarray
     attachment_points: np.ndarray
+    pulleys: Pulleys = field(default_factory=Pulleys)
     platform: RigidBody
     payload: RigidBody = field(default_factory=_no_payload)
     cable: Cable
@@ -307,6 +328,18 @@ class CableRobot(Record):
     def num_cables(self) -> int:
         """Number of cables k."""
         return self.drawing_points.shape[0]
+
+    @property
+    def pulley_radii(self) -> np.ndarray:
+        """Radii of the pulleys (k,) [m]; 0 where a cable leaves through an eyelet."""
+        return np.broadcast_to(self.pulleys.radius, (self.num_cables,))
+
+    @property
+    def pulley_axes(self) -> np.ndarray:
+        """Unit vectors (k, 3) along the pulleys' axes, in W, the way the cables enter."""
+        axis = self.pulleys.axis
+        unit: np.ndarray = axis / np.linalg.norm(axis, axis=-1, keepdims=True)
+        return np.broadcast_to(unit, (self.num_cables, 3))
 
     @property
     def mass(self) -> float:

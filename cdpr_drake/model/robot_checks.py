@@ -45,6 +45,7 @@ _POSITIVE = (
 )
 _NOT_NEGATIVE = (
     "payload.mass",
+    "pulleys.radius",
     "cable.damping_time",
     "cable.drum_run",
     "cable.min_tension",
@@ -68,6 +69,7 @@ _NOT_NEGATIVE = (
 _FINITE = (
     "drawing_points",
     "attachment_points",
+    "pulleys.axis",
     "platform.center_of_mass",
     "platform.inertia",
     "payload.center_of_mass",
@@ -98,6 +100,7 @@ def value_problems(robot: CableRobot) -> Problems:
         robot: the robot, its per-cable values given for each cable.
     """
     yield from _shapes(robot)
+    yield from _pulleys(robot)
     for path in _FINITE:
         yield from _require(robot, path, np.isfinite, "finite")
     for path in _POSITIVE:
@@ -171,6 +174,17 @@ def _twins(robot: CableRobot) -> Problems:
     for i, j in combinations(range(robot.num_cables), 2):
         if np.array_equal(ends[i], ends[j]):
             yield "drawing_points", f"cables {i + 1} and {j + 1} are the same at both ends"
+
+
+def _pulleys(robot: CableRobot) -> Problems:
+    k, pulleys = robot.num_cables, robot.pulleys
+    for name, one in (("radius", ()), ("axis", (3,))):
+        got = getattr(pulleys, name).shape
+        if got not in (one, (k, *one)):
+            yield f"pulleys.{name}", f"must have shape {one} or {(k, *one)}, got {got}"
+    for axis in pulleys.axis.reshape(-1, 3):
+        if not np.linalg.norm(axis) > 0.0:
+            yield "pulleys.axis", f"must be a direction, got {axis.tolist()}"
 
 
 def _inertias(robot: CableRobot) -> Problems:

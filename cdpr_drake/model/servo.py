@@ -86,7 +86,8 @@ class ServoSettings:
         ramp_time: time over which the gain rises from zero at the start [s].
         max_speed: limit of the target frame's speed [m/s].
         max_angular_speed: limit of its angular speed [rad/s].
-        model_drum_run: whether the row includes the stretch of the run from drum to eyelet.
+        model_drum_run: whether the row includes the stretch of the run from the drum, and of the
+            arc round a pulley.
     """
 
     cable_model: str = "SCMWE"
@@ -202,7 +203,7 @@ class PoseErrorMap:
 def _known(robot: CableRobot, model_drum_run: bool) -> tuple[Array, Array, Array, Array]:
     """Return points, body, stiffness and run, as the law's kernels take them."""
     arrays = RobotArrays(robot)
-    run = arrays.run if model_drum_run else np.zeros(robot.num_cables)
+    run = arrays.run if model_drum_run else np.full(robot.num_cables, -1.0)
     return arrays.points, arrays.body, arrays.stiffness, run
 
 
@@ -245,7 +246,8 @@ def D_a(
         H: (k,) [N] horizontal tensions.
         cable_model: "ECM", "CMWE", "SCMWE" or "SLSM".
         order: order of the series of the ECM.
-        model_drum_run: whether to include the stretch of the run from drum to eyelet.
+        model_drum_run: whether to include the stretch of the run from the drum, and of the arc
+            round a pulley.
         R_FW: (3, 3) rotation to the frame F of the twist; W itself if None.
 
     Raises:

@@ -21,7 +21,7 @@ from pydrake.math import RigidTransform
 
 from cdpr_drake.errors import GeometryError, TensionError
 from cdpr_drake.model.distribution import RANK_TOLERANCE, bounded_distribution, feasibility_margin
-from cdpr_drake.model.kinematics import D_B, CableGeometry, D_Bf, D_u, cable_geometry
+from cdpr_drake.model.kinematics import D_AB, D_B, CableGeometry, D_Bf, D_u, cable_geometry
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, as_pose, numbers, skew
 
@@ -121,7 +121,7 @@ def D_tau(robot: CableRobot, geometry: CableGeometry, H: ArrayLike) -> Array:
     D_f = (H * Bz / (L * Bx**2))[:, None, None] * geometry.u[:, :, None] * slope[:, None, :]
     velocity = D_Bf(geometry)
     D_u1 = D_f @ D_B(geometry) + (H * L / Bx)[:, None, None] * D_u(geometry)
-    stretch = np.einsum("ki,kij->kj", geometry.u, velocity)
+    stretch = np.einsum("ki,kij->kj", geometry.u, D_AB(geometry))
     D_urho = 0.5 * robot.weight_per_metre * geometry.z[None, :, None] * stretch[:, None, :]
     force = D_urho + D_u1
     D_EB = velocity.copy()

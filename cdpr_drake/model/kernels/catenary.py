@@ -65,6 +65,8 @@ MIN_STIFFNESS, MAX_STIFFNESS = 1e-3, 1e15  # [N]
 MAX_WEIGHT = 1e9  # [N/m]
 MAX_SPEED, MAX_DAMPING_TIME = 1e9, 1e9  # [m/s], [s]
 
+AFRESH = (0.0, 0.0, 0.0)
+
 
 @jit
 def secant_stiffness(T, asymptote, softening, offset):
@@ -438,11 +440,13 @@ def _admissible(Bx, L, length, run, w, asymptote, softening, offset):
 
 
 @jit
-def _solve(Bx, Bz, L, length, run, w, asymptote, softening, offset):
+def _solve(Bx, Bz, L, length, run, w, asymptote, softening, offset, start):
     """Solve an admissible cable. Return (H, V_B, l0, iterations, failed, near, linearisation), the
-    last two as `_newton` does.
+    last two as `_newton` does; start: (H, V_B, l0) nearby, or a guess is made where H is 0.
     """
-    H, V_B, l0 = _guess(Bx, Bz, L, length, run, w, asymptote, softening, offset)
+    H, V_B, l0 = start
+    if H == 0.0:
+        H, V_B, l0 = _guess(Bx, Bz, L, length, run, w, asymptote, softening, offset)
     H, V_B, l0, iterations, near, linear = _newton(
         Bx, Bz, L, length, run, w, asymptote, softening, offset, H, V_B, l0
     )
@@ -461,7 +465,7 @@ def solve_catenary(Bx, Bz, l0, w, EA):
     if not (_admissible(Bx, L, l0, 0.0, w, EA, 0.0, 0.0) and Bx > 0.0):
         return 0.0, 0.0, 0, 1
     H, V_B, _l0, iterations, failed, _near, _linear = _solve(
-        max(Bx, 1e-10 * L), Bz, L, l0, 0.0, max(w, MIN_WEIGHT), EA, 0.0, 0.0
+        max(Bx, 1e-10 * L), Bz, L, l0, 0.0, max(w, MIN_WEIGHT), EA, 0.0, 0.0, AFRESH
     )
     return H, V_B, iterations, 1 if failed else 0
 
@@ -477,6 +481,24 @@ def _leaning_chord(i, p_WA, p_WB):
         dy = 0.0
         Bx = lean
     return dx, dy, Bz, Bx, math.sqrt(Bx * Bx + Bz * Bz)
+
+
+@jit
+def guess_tangent(i, p_WA, p_WB, length, drum_run, w, stiffness):
+    """Return (t_A, kappa, start): roughly, the unit tangent [-] and the curvature [1/m] of cable i
+    at A, and (H, V_B, l0); for numbers that are no cable's, zeros.
+    """
+    dx, dy, Bz, Bx, L = _leaning_chord(i, p_WA, p_WB)
+    l, run = float(length[i]), float(drum_run[i])
+    law = (float(stiffness[0]), float(stiffness[1]), float(stiffness[2]))
+    if not _admissible(Bx, L, l, run, w, law[0], law[1], law[2]):
+        return (0.0, 0.0, 0.0), 0.0, AFRESH
+    w, level = max(w, MIN_WEIGHT), max(Bx, MIN_SLOPE * L)
+    H, V_B, l0 = _guess(level, Bz, L, l, run, w, law[0], law[1], law[2])
+    V_A = V_B - w * l0
+    T_A = math.sqrt(H * H + V_A * V_A)
+    share = H / (level * T_A)
+    return (share * dx, share * dy, V_A / T_A), w * H / (T_A * T_A), (H, V_B, l0)
 
 
 @jit
@@ -532,11 +554,13 @@ def _steepest(L, Bz):
 
 
 @jit
-def _force(
-    i, p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, damping_time, differs, out
-):
+def force(
+    i, p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, damping_time, differs, start,
+    out,
+):  # fmt: skip
     """Write row i of `out`. Return (failed, H, V_B, Bx as clamped, linearisation) for
-    `_differentiate`; the linearisation is at the solution if the cable is damped or `differs`.
+    `differentiate`; the linearisation is at the solution if the cable is damped or `differs`;
+    start: as in `_solve`.
     """
     dx, dy, Bz, Bx, L = _leaning_chord(i, p_WA, p_WB)
     l = float(length[i])
@@ -558,7 +582,7 @@ def _force(
     if clamped > Bx:
         Bz = _steepest(L, Bz)
     H, V_B, l0, _iterations, failed, near, linear = _solve(
-        clamped, Bz, L, l, run, w, asymptote, softening, offset
+        clamped, Bz, L, l, run, w, asymptote, softening, offset, start
     )
     # H/Bx stays finite for a vertical cable: with it the horizontal force needs no direction.
     q = H / clamped
@@ -625,9 +649,9 @@ def cable_forces(p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, 
     length of the span [m].
     """
     for i in range(len(length)):
-        failed, _H, _V_B, _Bx, _linear = _force(
+        failed, _H, _V_B, _Bx, _linear = force(
             i, p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, damping_time, False,
-            out,
+            AFRESH, out,
         )  # fmt: skip
         if failed:
             return i + 1
@@ -710,7 +734,7 @@ def _times(S, a):
 
 
 @jit
-def _differentiate(
+def differentiate(
     i, p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, damping_time,
     H, V_B, clamped, linear, out, jacobian,
 ):  # fmt: skip
@@ -834,36 +858,18 @@ def cable_forces_jacobian(
     (k, 14, 8). Where the damping is held at its limit the derivative is that of the limit.
     """
     for i in range(len(length)):
-        failed, H, V_B, Bx, linear = _force(
+        failed, H, V_B, Bx, linear = force(
             i, p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, damping_time, True,
-            out,
+            AFRESH, out,
         )  # fmt: skip
         if not failed:
-            failed = _differentiate(
+            failed = differentiate(
                 i, p_WA, p_WB, v_WB, length, length_rate, w, stiffness, drum_run, damping_time,
                 H, V_B, Bx, linear, out, jacobian,
             )  # fmt: skip
         if failed:
             return i + 1
     return 0
-
-
-@jit
-def robot_forces(p_WA, p_WB, v_WB, length, length_rate, constants, out):
-    """As `cable_forces`, with the cables' `constants` packed as in `model.arrays`."""
-    return cable_forces(
-        p_WA, p_WB, v_WB, length, length_rate, float(constants[0]), constants[1:4],
-        constants[6:], float(constants[4]), out,
-    )  # fmt: skip
-
-
-@jit
-def robot_forces_jacobian(p_WA, p_WB, v_WB, length, length_rate, constants, out, jacobian):
-    """As `cable_forces_jacobian`, with the cables' `constants` packed as in `model.arrays`."""
-    return cable_forces_jacobian(
-        p_WA, p_WB, v_WB, length, length_rate, float(constants[0]), constants[1:4],
-        constants[6:], float(constants[4]), out, jacobian,
-    )  # fmt: skip
 
 
 @jit
@@ -947,9 +953,10 @@ def irvine_from_horizontal(Bx, Bz, H, w, EA):
 
 @jit
 def robot_length(Bx, Bz, H, run, constants):
-    """Return (V_B, total unstrained length, status) of a cable that carries the tension H at rest.
+    """Return (V_A, V_B, total unstrained length, status) of a cable at rest with the tension H.
 
-    With the cables' `constants` packed as in `model.arrays`, and its own run from drum to eyelet.
+    With the cables' `constants` packed as in `model.arrays`, and its own run from the drum, with
+    the arc round its pulley.
     """
     w, asymptote, softening, offset = constants[0], constants[1], constants[2], constants[3]
     V_B, l0, _a, _b, _c, _d, _e, _f, status = irvine_row_softening(
@@ -958,4 +965,4 @@ def robot_length(Bx, Bz, H, run, constants):
     V_A = V_B - w * l0
     T_A = math.sqrt(H * H + V_A * V_A)
     EA = asymptote - softening / (T_A + offset)
-    return V_B, l0 + run / (1.0 + T_A / EA), status
+    return V_A, V_B, l0 + run / (1.0 + T_A / EA), status

@@ -15,8 +15,8 @@ import math
 import numpy as np
 
 from cdpr_drake.model.kernels import jit
-from cdpr_drake.model.kernels.catenary import robot_forces_jacobian
 from cdpr_drake.model.kernels.geometry import attachment_motion, cross, turned, vector
+from cdpr_drake.model.kernels.pulley import robot_forces
 
 MAX_ROTATION = 0.3  # of one step [rad]
 MAX_TRANSLATION = 1.0  # of one step [m]
@@ -50,9 +50,7 @@ def balance(R, p, length, points, constants, body, out, jacobian, wrench, stiffn
     p_WB, v_WB = np.zeros((k, 3)), np.zeros((k, 3))
     still = np.zeros(3)
     attachment_motion(R, p, still, still, points[1], p_WB, v_WB)
-    status = robot_forces_jacobian(
-        points[0], p_WB, v_WB, length, np.zeros(k), constants, out, jacobian
-    )
+    status = robot_forces(points, p_WB, v_WB, length, np.zeros(k), constants, True, out, jacobian)
     if status:
         return status
     weight = float(body[0])

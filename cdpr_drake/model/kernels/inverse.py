@@ -3,7 +3,8 @@
 Arguments in common: model, order: the cable model's index and the order of its series; rule: see
 below; pose (6,) [roll, pitch, yaw, x, y, z]; points, body, stiffness: as in `model.arrays`; limits
 (3,): lowest, highest, preferred chord tension [N]; A (6, k): wrench matrix; load (6,): wrench to
-balance; out (k,) [m] and T (k,) [N]: results; jacobian (k, 6): of out.
+balance; out (k,) [m] and T (k,) [N]: results; jacobian (k, 6): of out; chords (k, 3), arcs (k,):
+from where the cables leave to where they attach, and round the pulleys [m]; w [N/m].
 
 Statuses: 0, the number of a cable that would push, RANK_DEFICIENT, INFEASIBLE where no tensions
 within the limits hold the weight, or CORNER where tensions within them have no derivative.
@@ -14,10 +15,22 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.model.kernels import jit
-from cdpr_drake.model.kernels.cable_models import length_and_row_T
+from cdpr_drake.model.kernels.cable_models import (
+    ECM,
+    SLSM,
+    drawing_point_tension,
+    length_and_row_T,
+)
 from cdpr_drake.model.kernels.distribution import within_bounds
-from cdpr_drake.model.kernels.geometry import arm_and_chord, set_column, turned
+from cdpr_drake.model.kernels.geometry import (
+    arm_and_chord,
+    dot,
+    sagging_chord,
+    set_column,
+    turned,
+)
 from cdpr_drake.model.kernels.servo import (
+    CONTACT_ROUNDS,
     RANK_DEFICIENT,
     STEP,
     least_norm,
@@ -103,37 +116,72 @@ def tensions(rule, A, load, weight, limits, T):
 
 
 @jit
-def unstrained_lengths(model, order, rule, pose, points, body, stiffness, limits, out, T):
-    """Write the spans' unstrained lengths (k,) and chord tensions T (k,) at a pose (6,).
-
-    What horizontal tensions weigh near the vertical, `servo.norm_weight` says. Returns a status.
-    """
-    drawing, attachment = points[0], points[1]
-    k = drawing.shape[0]
+def _balance(R, pose, points, body, chords, D, load, weight):
+    """Write D (6, k), load (6,) and what squares of tensions weigh (k,), for chords (k, 3)."""
     w = body[4]
-    R = np.zeros((3, 3), pose.dtype)
-    rpy_matrix(pose[0], pose[1], pose[2], R)
-    D = np.zeros((6, k), pose.dtype)
-    Bx = np.zeros(k, pose.dtype)
-    Bz = np.zeros(k, pose.dtype)
-    weight = np.zeros(k, pose.dtype)
-    load = np.zeros(6, pose.dtype)
     Gx, Gy, _Gz = turned(R, body[1:4])
-    load[0], load[1], load[5] = -Gy * body[0], Gx * body[0], -body[0]
-    for i in range(k):
-        arm, (ax, ay, Bz[i]) = arm_and_chord(i, R, pose[3:6], drawing, attachment)
-        Bx[i] = np.sqrt(ax * ax + ay * ay)
-        L = np.sqrt(Bx[i] * Bx[i] + Bz[i] * Bz[i])
+    load[0], load[1], load[2] = -Gy * body[0], Gx * body[0], 0.0 * Gx
+    load[3], load[4], load[5] = 0.0 * Gx, 0.0 * Gx, -body[0] + 0.0 * Gx
+    for i in range(points.shape[1]):
+        ax, ay, az = chords[i, 0], chords[i, 1], chords[i, 2]
+        arm = turned(R, points[1, i])
+        L = np.sqrt(ax * ax + ay * ay + az * az)
         ux, uy = ax / L, ay / L
         weight[i] = norm_weight(ux * ux + uy * uy)
-        set_column(i, arm, (ux, uy, Bz[i] / L), D)
+        set_column(i, arm, (ux, uy, az / L), D)
         half = 0.5 * w * L
         load[0] -= arm[1] * half
         load[1] += arm[0] * half
         load[5] -= half
-    status = tensions(rule, D, load, weight, limits, T)
-    if status in (RANK_DEFICIENT, INFEASIBLE):
-        return status
+
+
+@jit
+def _sag(R, pose, points, w, T, chords, arcs):
+    """Move chords and arcs, in place, to where cables of chord tensions T (k,) leave pulleys."""
+    for i in range(points.shape[1]):
+        if points[3, i, 0] == 0.0:
+            continue
+        AB = (chords[i, 0], chords[i, 1], chords[i, 2])
+        arm = turned(R, points[1, i])
+        b = (arm[0] + pose[3], arm[1] + pose[4], arm[2] + pose[5])
+        least = 0.05 * w * np.sqrt(dot(AB, AB))
+        tension = T[i] if T[i].real > least.real else least
+        (chords[i, 0], chords[i, 1], chords[i, 2]), arcs[i] = sagging_chord(
+            i, points, b, AB, tension, w
+        )
+
+
+@jit
+def unstrained_lengths(model, order, rule, pose, points, body, stiffness, limits, out, T):
+    """Write unstrained lengths (k,), of spans and arcs, and chord tensions T (k,) at a pose (6,).
+
+    What horizontal tensions weigh near the vertical, `servo.norm_weight` says. Arcs stretch where
+    the model does. Returns a status.
+    """
+    k = points.shape[1]
+    w = body[4]
+    R = np.zeros((3, 3), pose.dtype)
+    rpy_matrix(pose[0], pose[1], pose[2], R)
+    D = np.zeros((6, k), pose.dtype)
+    chords = np.zeros((k, 3), pose.dtype)
+    arcs = np.zeros(k, pose.dtype)
+    weight = np.zeros(k, pose.dtype)
+    load = np.zeros(6, pose.dtype)
+    rounds = 1
+    for i in range(k):
+        _arm, _b, (chords[i, 0], chords[i, 1], chords[i, 2]), arcs[i] = arm_and_chord(
+            i, R, pose[3:6], points
+        )
+        if points[3, i, 0] != 0.0 and model != SLSM:
+            rounds = 1 + CONTACT_ROUNDS
+    status = 0
+    for again in range(rounds):
+        if again > 0:
+            _sag(R, pose, points, w, T, chords, arcs)
+        _balance(R, pose, points, body, chords, D, load, weight)
+        status = tensions(rule, D, load, weight, limits, T)
+        if status in (RANK_DEFICIENT, INFEASIBLE):
+            return status
     for i in range(k):
         if not T[i].real > 0.0:
             status = i + 1
@@ -141,7 +189,12 @@ def unstrained_lengths(model, order, rule, pose, points, body, stiffness, limits
         EA = stiffness[0] + 0.0 * T[i]
         if stiffness[1] != 0.0:
             EA = stiffness[0] - stiffness[1] / (T[i] + stiffness[2])
-        out[i], _, _, _ = length_and_row_T(model, order, Bx[i], Bz[i], T[i], w, EA)
+        ax, ay, az = chords[i, 0], chords[i, 1], chords[i, 2]
+        Bx = np.sqrt(ax * ax + ay * ay)
+        out[i], _, _, _ = length_and_row_T(model, order, Bx, az, T[i], w, EA)
+        if model == ECM:
+            arcs[i] /= 1.0 + drawing_point_tension(Bx, az, T[i], w)[0] / EA
+        out[i] += arcs[i]
     return status
 
 

@@ -48,8 +48,7 @@ def weigh(z, points, body, p, M, G, low, floor):
     outer products over the trust in their cells; low (k,): 1 for a reading below p[0], 0 above
     p[1]; floor (k,) [N]: least tension of each cable for the law.
     """
-    drawing, attachment = points[0], points[1]
-    k = drawing.shape[0]
+    k = points.shape[1]
     R = np.zeros((3, 3), z.dtype)
     rpy_matrix(z[0], z[1], z[2], R)
     w, radius = body[4], p[7]
@@ -61,7 +60,7 @@ def weigh(z, points, body, p, M, G, low, floor):
     for a in range(6):
         M[a, k] = -M[a, k + 1]
     for i in range(k):
-        arm, (ax, ay, az) = arm_and_chord(i, R, z[3:6], drawing, attachment)
+        arm, _b, (ax, ay, az), _arc = arm_and_chord(i, R, z[3:6], points)
         L = np.sqrt(ax * ax + ay * ay + az * az)
         set_column(i, arm, (ax / L, ay / L, az / L), M)
         for a in range(3):

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.model.kernels import jit
-from cdpr_drake.model.kernels.catenary import robot_forces
 from cdpr_drake.model.kernels.geometry import attachment_motion, cross, vector
+from cdpr_drake.model.kernels.pulley import robot_forces
 from cdpr_drake.model.kernels.servo import rpy_matrix
 
 
@@ -20,7 +20,7 @@ def platform_cable_forces(state, length, rate, points, constants, packed):
     """Write the cables' wrench [torque; force] at the platform's origin and their outputs, packed.
 
     packed = [wrench (6); T_A (k); T_B (k); t_A (3 k); t_B (3 k); dbeta (k)]. Returns the status of
-    `cable_forces`, or minus the number of a cable whose tension is not below the breaking load.
+    `robot_forces`, or minus the number of a cable whose tension is not below the breaking load.
     """
     k = points.shape[1]
     p_WB = np.empty((k, 3))
@@ -29,7 +29,8 @@ def platform_cable_forces(state, length, rate, points, constants, packed):
     R = np.zeros((3, 3))
     rpy_matrix(float(state[0]), float(state[1]), float(state[2]), R)
     attachment_motion(R, state[3:6], state[6:9], state[9:12], points[1], p_WB, v_WB)
-    status = robot_forces(points[0], p_WB, v_WB, length, rate, constants, out)
+    unused = np.empty((0, 14, 8))
+    status = robot_forces(points, p_WB, v_WB, length, rate, constants, False, out, unused)
     x, y, z = vector(state[3:6])
     tx, ty, tz, sx, sy, sz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(k):

@@ -22,10 +22,20 @@ from cdpr_drake.model.kernels.cable_models import (
     length_and_row_T,
     run_row,
 )
-from cdpr_drake.model.kernels.geometry import arm_and_chord, cross, set_column, turned
+from cdpr_drake.model.kernels.geometry import (
+    arm_and_chord,
+    cross,
+    followed,
+    sagging_chord,
+    set_column,
+    turned,
+)
 
 RANK_DEFICIENT = -1
 STEP = 1e-40
+
+CONTACT_ROUNDS = 2
+"""Of finding tension and contact with a pulley from each other, a thousand times better each."""
 
 STEEP2 = 4e-4
 """Square of the cosine of the elevation above which a chord is near the vertical, by a degree."""
@@ -173,15 +183,20 @@ def length_rates(model, order, R, p, twist, T_A, cos_alpha, points, body, stiffn
     """Write the rates of the unstrained lengths (eq. 13) for a twist [omega; v] of E in W.
 
     R, p: the pose; T_A, cos_alpha (k,): tension at the drawing points and cosine of the tangents'
-    elevation there, so that H = T_A cos_alpha (eq. 16); run (k,): drum-to-eyelet runs that the law
-    models (zero: it does not). Returns False when the wrench matrix has rank below 6.
+    elevation there, so that H = T_A cos_alpha (eq. 16); run (k,): runs from drum to drawing point
+    whose stretch, and that of the arc round a pulley, the law models (negative: it does not).
+    Returns False when the wrench matrix has rank below 6.
+
+    Rows and tensions are those at the contact of the moment. A cable that rolls on its pulley adds
+    to the arc what its span loses, so that this changes no row.
 
     Among the rates of the tensions that keep the balance those of the horizontal tensions are of
     least norm, written in chord tensions: H' = c T' + T c'.
     """
     k = run.shape[0]
-    drawing, attachment = points[0], points[1]
     weight, w = body[0], body[4]
+    sag = 0.0 if model == SLSM else w
+    models_run = False
     omega = (twist[0], twist[1], twist[2])
     D = np.zeros((6, k), R.dtype)
     change = np.zeros(6, R.dtype)
@@ -189,26 +204,36 @@ def length_rates(model, order, R, p, twist, T_A, cos_alpha, points, body, stiffn
     known = np.zeros(k, R.dtype)
     scale = np.zeros(k, R.dtype)
     for i in range(k):
-        arm, (ax, ay, Bz) = arm_and_chord(i, R, p, drawing, attachment)
+        arm, b, AB, arc = arm_and_chord(i, R, p, points)
+        tension = T_A[i] if T_A[i].real > 0.0 else 0.0 * T_A[i]
+        ax, ay, Bz = AB
         Bx = np.sqrt(ax * ax + ay * ay)
         L = np.sqrt(Bx * Bx + Bz * Bz)
-        # Velocity of B.
-        turn = cross(omega, arm)
-        vx, vy, vz = twist[3] + turn[0], twist[4] + turn[1], twist[5] + turn[2]
-        outwards = ax * vx + ay * vy
-        tension = T_A[i] if T_A[i].real > 0.0 else 0.0 * T_A[i]
         T = chord_tension(tension, cos_alpha[i], Bx, Bz, L, w)
+        if points[3, i, 0] != 0.0:
+            for _round in range(CONTACT_ROUNDS):
+                AB, arc = sagging_chord(i, points, b, AB, T, sag)
+                ax, ay, Bz = AB
+                Bx = np.sqrt(ax * ax + ay * ay)
+                L = np.sqrt(Bx * Bx + Bz * Bz)
+                T = chord_tension(tension, cos_alpha[i], Bx, Bz, L, w)
+        # Velocity of B, as seen from A.
+        turn = cross(omega, arm)
+        v_B = (twist[3] + turn[0], twist[4] + turn[1], twist[5] + turn[2])
+        vx, vy, vz = followed(i, points, b, AB, v_B)
+        outwards = ax * vx + ay * vy
         EA = stiffness[0] + 0.0 * tension
         if stiffness[1] != 0.0:
             EA = stiffness[0] - stiffness[1] / (tension + stiffness[2])
         _, M1, M2, M3 = length_and_row_T(model, order, Bx, Bz, T, w, EA)
-        if run[i] != 0.0:
-            N1, N2, N3 = run_row(run[i], EA, Bx, Bz, T, w)
+        if run[i] >= 0.0:
+            models_run = True
+            N1, N2, N3 = run_row(run[i] + arc, EA, Bx, Bz, T, w)
             M1, M2, M3 = M1 + N1, M2 + N2, M3 + N3
         rates[i] = M2 * vz
         if Bx != 0.0:  # else M1 is zero
             rates[i] += M1 / Bx * outwards
-        if model == SLSM and run[i] == 0.0:
+        if model == SLSM and run[i] < 0.0:
             continue
         by_T[i] = M3
         ux, uy, uz = ax / L, ay / L, Bz / L
@@ -228,7 +253,7 @@ def length_rates(model, order, R, p, twist, T_A, cos_alpha, points, body, stiffn
         scale[i] = 1.0 / np.sqrt(norm_weight(c2))
         known[i] = scale[i] * stiff * (outwards / L - c2 * dL)  # T c c' over the weight
         set_column(i, arm, (scale[i] * ux, scale[i] * uy, scale[i] * uz), D)
-    if model == SLSM and not np.any(run):
+    if model == SLSM and not models_run:
         return True
     # The weight's moment changes as G turns about E: d(EG x m g) = (omega x EG) x m g.
     turn = cross(omega, turned(R, body[1:4]))
