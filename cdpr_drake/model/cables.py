@@ -8,6 +8,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from cdpr_drake.errors import EquilibriumError
 from cdpr_drake.model.arrays import RobotArrays
+from cdpr_drake.model.pulleys import no_catenary
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, rpy_rate_matrix, skew
 
@@ -127,7 +128,8 @@ class CableSet:
             out, jacobian, wrench, stiffness,
         )  # fmt: skip
         if status:
-            raise EquilibriumError(f"cable {status} has no catenary at this pose and length")
+            length = np.asarray(length, float)
+            raise EquilibriumError(str(no_catenary(self.robot, status, X_WP, length[status - 1])))
         return wrench, stiffness, out, jacobian
 
 

@@ -14,7 +14,7 @@ from cdpr_drake.model.cables import CableSet, pose_arrays
 from cdpr_drake.model.catenary import chord_tension
 from cdpr_drake.model.inverse_kinematics import motor_angles
 from cdpr_drake.model.kinematics import cable_geometry
-from cdpr_drake.model.pulleys import has_pulleys
+from cdpr_drake.model.pulleys import has_pulleys, no_catenary
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, as_pose, exp_rotation
 from cdpr_drake.model.statics import (
@@ -201,7 +201,8 @@ def forward_kinematics(
         TOLERANCE, max_iterations, out, jacobian, unbalanced,
     )  # fmt: skip
     if status:
-        raise EquilibriumError(f"cable {status} has no catenary at this pose and length")
+        X_WP = RigidTransform(RotationMatrix.ProjectToRotationMatrix(R), p)
+        raise EquilibriumError(str(no_catenary(robot, status, X_WP, length[status - 1])))
     if not residual <= 1e3 * TOLERANCE:
         slackest = int(np.argmin(out[:, 3]))
         raise EquilibriumError(

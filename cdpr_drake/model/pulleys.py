@@ -18,8 +18,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from pydrake.math import RigidTransform
 
-from cdpr_drake.errors import GeometryError
+from cdpr_drake.errors import CableError, GeometryError
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array
 
@@ -111,6 +112,37 @@ def contact(robot: CableRobot, p_WB: Array, tangents: Array | None = None) -> Co
     theta = np.arctan2(s, c)
     theta = np.where(_true(theta < -1e-12), theta + 2.0 * np.pi, theta)
     return Contact(p_WA, np.where(rho > 0.0, theta, 0.0 * theta), e, tangent, _above(distance))
+
+
+def no_catenary(
+    robot: CableRobot, cable: int, X_WP: RigidTransform, length: float, time: float | None = None
+) -> CableError:
+    """Return the error that says why a cable has no place to hang.
+
+    Args:
+        robot: the robot.
+        cable: its number, from 1.
+        X_WP: the pose.
+        length: [m] total unstrained length.
+        time: of a run [s], or None.
+    """
+    i = cable - 1
+    if robot.pulley_radii[i] > 0.0:
+        p_WB = robot.attachment_points @ X_WP.rotation().matrix().T + X_WP.translation()
+        try:
+            found = contact(robot, p_WB)
+        except GeometryError as error:
+            return CableError(cable, time, str(error))
+        straight = robot.cable.drum_run[i] + robot.pulley_radii[i] * found.theta[i]
+        straight += np.linalg.norm(p_WB[i] - found.p_WA[i])
+        if length > straight:
+            return CableError(
+                cable,
+                time,
+                f"nowhere to leave its pulley: unstrained {length:.6g} m long, where a straight "
+                f"cable has {straight:.6g} m, it would go all the way round",
+            )
+    return CableError(cable, time, f"no catenary of unstrained length {length:.6g} m")
 
 
 def _dot(a: Array, b: Array) -> Array:

@@ -9,6 +9,7 @@ from cdpr_drake.errors import CableError
 from cdpr_drake.model.cables import CableSet, packed_sizes
 from cdpr_drake.model.digits import significant
 from cdpr_drake.model.kinematics import cable_geometry
+from cdpr_drake.model.pulleys import no_catenary
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import vector_to_pose
 from cdpr_drake.model.statics import wrench_matrix
@@ -107,18 +108,24 @@ class CatenaryCableForce(LeafSystem):
             packed, status, jacobian = self._cables.with_jacobian(*map(value, args))
         if status:
             check_finite(value(args[0]), self, context, "input platform_state")
-            raise_cable_error(self.robot, context, value(args[1]), packed, status)
+            raise_cable_error(self.robot, context, *map(value, args[:2]), packed, status)
         output.SetFromVector(packed if jacobian is None else chain(packed, jacobian, *args))
 
 
 def raise_cable_error(
-    robot: CableRobot, context: Context, length: np.ndarray, packed: np.ndarray, status: int
+    robot: CableRobot,
+    context: Context,
+    state: np.ndarray,
+    length: np.ndarray,
+    packed: np.ndarray,
+    status: int,
 ) -> None:
     """Raise what a status of `CableSet` that is not 0 means.
 
     Args:
         robot: the robot.
         context: of the system that solved for the cables, for the time.
+        state: (12,) or more, the platform's first.
         length: (k,) total unstrained lengths [m].
         packed: as `CableSet` gives it.
         status: likewise.
@@ -129,7 +136,7 @@ def raise_cable_error(
     time = seconds(context)
     cable, k = abs(status), robot.num_cables
     if status > 0:
-        raise CableError(cable, time, f"no catenary of unstrained length {length[cable - 1]:.6g} m")
+        raise no_catenary(robot, cable, vector_to_pose(state[:6]), length[cable - 1], time)
     highest = packed[5 + cable : 6 + 2 * k : k].max()
     limit = robot.cable.breaking_load
     raise CableError(

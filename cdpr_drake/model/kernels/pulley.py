@@ -308,10 +308,45 @@ def _find(i, pulley, wrap, e, span, p_WB, v_WB, length, rate, w, law, p_WA, run,
 
 
 @jit
+def _damped_parts(i, rate, v, viscosity, rho, run, out, jacobian, damped, by_turn):
+    """Write what damping adds to the first five outputs, and to their change with theta.
+
+    The gradient e of the stretch is by B and the length (kernels/catenary.py), and the run enters
+    the span as the length does, over 1 + strain: of e itself the strain changes too, which its
+    share of the length says, run / (1 + strain) = length - l0.
+    """
+    for row in range(5):
+        damped[row], by_turn[row] = 0.0, 0.0
+    pull = jacobian[i, 3, 7]  # - viscosity e_l^2
+    if pull == 0.0:
+        return
+    e_l = -math.sqrt(-pull / viscosity)
+    e_B = (
+        -jacobian[i, 0, 7] / (viscosity * e_l),
+        -jacobian[i, 1, 7] / (viscosity * e_l),
+        -jacobian[i, 2, 7] / (viscosity * e_l),
+    )
+    T_d = viscosity * (dot(e_B, v) + e_l * rate)
+    share = rho * e_l / run
+    d_B = (
+        share * jacobian[i, 13, 0], share * jacobian[i, 13, 1], share * jacobian[i, 13, 2]
+    )  # fmt: skip
+    d_l = share * (jacobian[i, 13, 6] - 1.0)
+    dT_d = viscosity * (dot(d_B, v) + d_l * rate)
+    t_B = (out[i, 8], out[i, 9], out[i, 10])
+    for a in range(3):
+        damped[a] = -e_B[a] * T_d
+        by_turn[a] = -(d_B[a] * T_d + e_B[a] * dT_d)
+    damped[3], by_turn[3] = -e_l * T_d, -(d_l * T_d + e_l * dT_d)
+    damped[4] = dot(e_B, t_B) * T_d
+    by_turn[4] = dot(d_B, t_B) * T_d + dot(e_B, t_B) * dT_d
+
+
+@jit
 def _follow(i, pulley, wrap, e, B, strain, damped, l, by_contact, jacobian):
     """Add to jacobian[i] what comes from the contact's following B and the length.
 
-    by_contact (2, 14): scratch; damped (5,): the parts of the first outputs that damping adds.
+    by_contact (2, 14): scratch, its first five `_damped_parts`' by_turn; damped (5,): from there.
     """
     F, a, rho, _run, upright = pulley
     _theta, s, c = wrap
@@ -323,7 +358,9 @@ def _follow(i, pulley, wrap, e, B, strain, damped, l, by_contact, jacobian):
     for row in range(14):
         X_B = vector(jacobian[i, row])
         own = damped[row] / l if row < 5 else 0.0
-        by_turn[row] = -rho * (dot(X_B, t) + (float(jacobian[i, row, 6]) - own) / (1.0 + strain))
+        more = by_turn[row] if row < 5 else 0.0
+        along = dot(X_B, t) + (float(jacobian[i, row, 6]) - own) / (1.0 + strain)
+        by_turn[row] = more - rho * along
         by_swivel[row] = -r * dot(X_B, f)
     # The conditions n . t_A = 0 and f . t_A = 0, by theta and sigma.
     turn_t, swivel_t = vector(by_turn[5:8]), vector(by_swivel[5:8])
@@ -399,14 +436,12 @@ def _over_pulleys(points, p_WB, v_WB, length, rate, constants, differs, out, jac
             )  # fmt: skip
             if rho > 0.0:
                 h, V_A = out[i, 12], V_B - w * out[i, 13]
-                T_A, T_B = math.sqrt(h * h + V_A * V_A), math.sqrt(h * h + V_B * V_B)
-                is_cut = out[i, 3] == 0.0 or out[i, 4] == 0.0
-                for row in range(3):
-                    damped[row] = 0.0 if is_cut else out[i, row] + T_B * out[i, 8 + row]
-                damped[3] = 0.0 if is_cut else out[i, 3] - T_A
-                damped[4] = 0.0 if is_cut else out[i, 4] - T_B
+                T_A, l = math.sqrt(h * h + V_A * V_A), float(length[i])
                 EA, _slope = secant_stiffness(T_A, float(law[0]), float(law[1]), float(law[2]))
-                l = float(length[i])
+                _damped_parts(
+                    i, float(rate[i]), vector(v_WB[i]), EA * damping_time / l, rho, run[i],
+                    out, jacobian, damped, by_contact[0],
+                )  # fmt: skip
                 _follow(i, pulley, wrap, e, B, T_A / EA, damped, l, by_contact, jacobian)
         if failed:
             return i + 1
