@@ -46,6 +46,9 @@ SETTLED, ROUGHLY = 1e-6, 1e-4
 them the more, the less the matrix of the steps, wrong by part of the bend round the pulley, is off.
 """
 
+TIGHT = 1e-9
+"""Angles [rad] that are not worth another step: they move A by nanometres at most."""
+
 FOUND = 1e-12
 """Angles [rad] at which a search ends."""
 
@@ -54,6 +57,9 @@ ROUNDS = 30
 LARGEST_TURN, LARGEST_SWIVEL = 0.7, 1.0  # rad a step
 
 WALK = 0.1  # of swivel a step [rad]
+
+NOT_HUNG = (True, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+"""What `catenary.force` returns where it has not been called."""
 
 
 @jit
@@ -101,39 +107,45 @@ def _place(i, pulley, wrap, e, p_WA, run):
 
 
 @jit
-def _settle(i, pulley, wrap, e, span, p_WB, v_WB, length, rate, w, law, p_WA, run, out):
+def _settle(
+    i, pulley, wrap, e, span, p_WB, v_WB, length, rate, w, law, damping_time, differs, p_WA, run,
+    out,
+):  # fmt: skip
     """Find the contact from a straight cable's, `span` long, by quasi-Newton steps.
 
-    Return (failed, wrap, e, nearby), the last as `start` of `catenary.force`. The matrix of the
-    first steps is that of a straight cable with the curvature of this one; Broyden's rule improves
-    it.
+    Return (failed, wrap, e, hung), and row i of `out` written there; hung: what `catenary.force`
+    has returned. The matrix of the first steps is that of a straight cable with the curvature of
+    this one; Broyden's rule improves it.
     """
     _F, a, rho, _run, upright = pulley
     _place(i, pulley, wrap, e, p_WA, run)
     t_A, kappa, nearby = guess_tangent(i, p_WA, p_WB, length, run, w, law)
-    theta, s, c = wrap
+    _theta, s, c = wrap
     J11, J12, J21 = -1.0 - a[2] * rho * kappa, 0.0, 0.0
     J22 = -1.0 - rho * (1.0 - c) / max(span * abs(s), 1e-9)
     enough = min(max(SETTLED, 5e-10 / max(rho * kappa, 1e-9)), ROUGHLY)
     r1, r2, turn, swivel = 0.0, 0.0, 0.0, 0.0
-    solves = False
+    solves, is_last, hung = False, False, NOT_HUNG
     for _round in range(ROUNDS):
         if solves:
             _place(i, pulley, wrap, e, p_WA, run)
-            failed, H, V_B, _Bx, _linear = force(
-                i, p_WA, p_WB, v_WB, length, rate, w, law, run, 0.0, False, nearby, out
+            hung = force(
+                i, p_WA, p_WB, v_WB, length, rate, w, law, run, damping_time, differs, nearby, out
             )
-            if failed:  # no span left, or nearly none: back half of the way
+            if hung[0]:  # no span left, or nearly none: back half of the way
                 if max(abs(turn), abs(swivel)) < SETTLED:
-                    return True, wrap, e, nearby
-                turn, swivel, nearby = 0.5 * turn, 0.5 * swivel, AFRESH
+                    return True, wrap, e, hung
+                turn, swivel, nearby, is_last = 0.5 * turn, 0.5 * swivel, AFRESH, False
                 wrap, e = _wrap(wrap[0] - turn), _turned_about(a, e, -swivel)
                 continue
-            nearby = (H, V_B, float(out[i, 13]))
+            nearby = (hung[1], hung[2], float(out[i, 13]))
             t_A = (out[i, 5], out[i, 6], out[i, 7])
         new1, new2 = misfit(a, wrap, e, t_A)
         if upright:
             new2 = 0.0
+        size = max(abs(new1), abs(new2 * wrap[1]))
+        if solves and (is_last or size < TIGHT):
+            return not (size < enough and 0.0 <= wrap[0] < 2.0 * math.pi), wrap, e, hung
         square = turn * turn + swivel * swivel
         if square > 0.0 and r1 != 0.0:
             g1 = (new1 - r1 - J11 * turn - J12 * swivel) / square
@@ -143,21 +155,18 @@ def _settle(i, pulley, wrap, e, span, p_WB, v_WB, length, rate, w, law, p_WA, ru
         r1, r2 = (new1, new2) if solves else (0.0, 0.0)
         det = J11 * J22 - J12 * J21
         if not abs(det) > 1e-9:
-            return True, wrap, e, nearby
+            return True, wrap, e, hung
         turn = min(max((J12 * new2 - J22 * new1) / det, -LARGEST_TURN), LARGEST_TURN)
         swivel = min(max((J21 * new1 - J11 * new2) / det, -LARGEST_SWIVEL), LARGEST_SWIVEL)
         theta = wrap[0] + turn
         if not upright:
             e = _turned_about(a, e, swivel)
-        is_there = solves and abs(new1) < enough and abs(new2 * wrap[1]) < enough
-        if theta < 0.0 and not upright and not is_there:
+        is_last = solves and size < enough
+        if theta < 0.0 and not upright and not is_last:
             theta, e, r1 = -theta, (-e[0], -e[1], -e[2]), 0.0
             J12, J21 = -J12, -J21
-        wrap = _wrap(theta)
-        if is_there:
-            return not 0.0 <= theta < 2.0 * math.pi, wrap, e, nearby
-        solves = True
-    return True, wrap, e, nearby
+        wrap, solves = _wrap(theta), True
+    return True, wrap, e, hung
 
 
 @jit
@@ -285,7 +294,10 @@ def _search(i, pulley, theta, e, hanging):
 
 
 @jit
-def _find(i, pulley, wrap, e, span, p_WB, v_WB, length, rate, w, law, p_WA, run, out):
+def _find(
+    i, pulley, wrap, e, span, p_WB, v_WB, length, rate, w, law, damping_time, differs, p_WA, run,
+    out,
+):  # fmt: skip
     """Find the contact: from the straight cable's; by a search; from others about the axis.
 
     Arguments and result as those of `_settle`.
@@ -295,16 +307,22 @@ def _find(i, pulley, wrap, e, span, p_WB, v_WB, length, rate, w, law, p_WA, run,
         if attempt == 1:
             hanging = (p_WB, v_WB, length, rate, w, law, p_WA, run, out)
             failed, theta, new_e = _search(i, pulley, wrap[0], start, hanging)
-            found, nearby = _wrap(theta), AFRESH
-        else:
-            failed, found, new_e, nearby = _settle(
-                i, pulley, wrap, e, span, p_WB, v_WB, length, rate, w, law, p_WA, run, out
+            found = _wrap(theta)
+            _place(i, pulley, found, new_e, p_WA, run)
+            hung = force(
+                i, p_WA, p_WB, v_WB, length, rate, w, law, run, damping_time, differs, AFRESH, out
             )
+            failed = failed or hung[0]
+        else:
+            failed, found, new_e, hung = _settle(
+                i, pulley, wrap, e, span, p_WB, v_WB, length, rate, w, law, damping_time, differs,
+                p_WA, run, out,
+            )  # fmt: skip
         if not failed or (upright and attempt > 0):
             break
         if attempt > 0:
             wrap, e = _wrap(0.1), _turned_about(pulley[1], start, 0.25 * math.pi * attempt)
-    return failed, found, new_e, nearby
+    return failed, found, new_e, hung
 
 
 @jit
@@ -415,27 +433,28 @@ def _over_pulleys(points, p_WB, v_WB, length, rate, constants, differs, out, jac
         F, a, B = vector(points[0, i]), vector(points[2, i]), vector(p_WB[i])
         rho = float(points[3, i, 0])
         pulley = (F, a, rho, float(constants[6 + i]), is_upright(a))
-        wrap, e, nearby = (0.0, 0.0, 1.0), a, AFRESH
+        wrap, e = (0.0, 0.0, 1.0), a
         if rho > 0.0:
             wrap, e, span = straight_contact(F, a, rho, B)
             if not span > 0.0:
                 return i + 1
-            failed, wrap, e, nearby = _find(
-                i, pulley, wrap, e, span, p_WB, v_WB, length, rate, w, law, p_WA, run, out
+            failed, wrap, e, hung = _find(
+                i, pulley, wrap, e, span, p_WB, v_WB, length, rate, w, law, damping_time, differs,
+                p_WA, run, out,
+            )  # fmt: skip
+        else:
+            _place(i, pulley, wrap, e, p_WA, run)
+            hung = force(
+                i, p_WA, p_WB, v_WB, length, rate, w, law, run, damping_time, differs, AFRESH, out
             )
-            if failed:
-                return i + 1
-        _place(i, pulley, wrap, e, p_WA, run)
-        failed, H, V_B, Bx, linear = force(
-            i, p_WA, p_WB, v_WB, length, rate, w, law, run, damping_time, differs, nearby, out
-        )
+            failed = hung[0]
         if not failed and differs:
             failed = differentiate(
                 i, p_WA, p_WB, v_WB, length, rate, w, law, run, damping_time,
-                H, V_B, Bx, linear, out, jacobian,
+                hung[1], hung[2], hung[3], hung[4], out, jacobian,
             )  # fmt: skip
             if rho > 0.0:
-                h, V_A = out[i, 12], V_B - w * out[i, 13]
+                h, V_A = out[i, 12], hung[2] - w * out[i, 13]
                 T_A, l = math.sqrt(h * h + V_A * V_A), float(length[i])
                 EA, _slope = secant_stiffness(T_A, float(law[0]), float(law[1]), float(law[2]))
                 _damped_parts(
