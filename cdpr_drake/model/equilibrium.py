@@ -37,7 +37,7 @@ class RestState:
 
     Attributes:
         X_WP: the pose.
-        unstrained_length: (k,) [m] with the run from drum to eyelet.
+        unstrained_length: (k,) [m] from the drum on.
         chord_tension: (k,) [N] horizontal tension over cos(beta0).
         tension_at_drawing_point: (k,) [N].
         tension_at_attachment_point: (k,) [N].
@@ -177,7 +177,7 @@ def forward_kinematics(
 
     Args:
         robot: the robot.
-        length: (k,) [m] total unstrained lengths, run from drum to eyelet included.
+        length: (k,) [m] total unstrained lengths, from the drum on.
         guess: a pose to start from, X_WP or [roll, pitch, yaw, x, y, z] (rad, m).
         max_iterations: after how many evaluations to give up.
         wrench: (6,) [torque; force] on the platform at its origin in W, besides weight and cables;

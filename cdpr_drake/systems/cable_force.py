@@ -44,8 +44,9 @@ class CatenaryCableForce(LeafSystem):
         - packed
 
     Each cable is the exact elastic catenary (Irvine, Cable Structures, 1981) between its
-    drawing point A and attachment point B, in series with the run from drum to eyelet, which
-    stretches with it. Structural damping resists the rate s at which a cable stretches, as its
+    drawing point A and attachment point B, in series with the run from the drum, which stretches
+    with it. Where a cable leaves over a pulley, A is where it does, on a pulley that swivels
+    after it, and the arc round the pulley stretches as the run does. Structural damping resists the rate s at which a cable stretches, as its
     tension at rest has it, not its gain of chord, which may be loss of sag:
 
         s = e_B . v_B + e_l dl/dt,   T_d = (E A t_d / l) s,
