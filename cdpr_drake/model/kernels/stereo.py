@@ -1,12 +1,12 @@
 """Cables near where they leave in the images of stereo pairs, and their tangents from them.
 
-Arguments: A (3,), u (3,): where a cable leaves and unit tangent there, from A to B, in W; T: tension there
-[N]; w: weight per unstrained metre [N/m]; EA: axial stiffness [N]; radius: of the cable [m]; s,
-stations (n,): unstrained lengths from A [m]; camera (21,): as kernels/vision.py has it; plane
-(2, n, 2): normalised image coordinates of both edges, NaN where not seen; pixels: the same in
-pixels; normal (3,): unit normal of an interpretation plane, in W. For k cables: points (4,
-k, 3): as in `model.arrays`, of which A follows with the tangent; tangents (k, 3), tensions (k,), lefts, rights (k, 21), images (k, 2, 2, n, 2) by cable, camera and
-edge.
+Arguments: A (3,), u (3,): where a cable leaves, and its unit tangent there, from A to B, in W; T:
+tension there [N]; w: weight per unstrained metre [N/m]; EA: axial stiffness [N]; radius: of the
+cable [m]; s, stations (n,): unstrained lengths from A [m]; camera (21,): as kernels/vision.py has
+it; plane (2, n, 2): normalised image coordinates of both edges, NaN where not seen; pixels: the
+same in pixels; normal (3,): unit normal of an interpretation plane, in W. For k cables: points (4,
+k, 3): as in `model.arrays`, of which each A follows with the tangent; tangents (k, 3), tensions
+(k,), lefts, rights (k, 21), images (k, 2, 2, n, 2) by cable, camera and edge.
 """
 
 from __future__ import annotations
@@ -237,8 +237,9 @@ def measure(
 
     What the pairs see is the direction of a line laid through a sagging piece of cable. For a
     tangent u and the tension, the same line is laid through the piece computed, from where a cable
-    leaves along u; u is moved until both agree. towards (k, 3): directions from A to B; sines (k,): of the angles between planes, 0
-    where a cable is not seen; bias (k,): angle from tangent to line [rad].
+    leaves along u; u is moved until both agree. towards (k, 3): directions from A to B; sines (k,):
+    of the angles between planes, 0 where a cable is not seen; bias (k,): angle from tangent to line
+    [rad].
     """
     n = stations.shape[0]
     seen = np.empty((2, 2, n, 2))
