@@ -130,6 +130,28 @@ def away_from_entry(a, rho, wrap, e):
 
 
 @jit
+def place_leaving(i, points, t, p_WA):
+    """Write where cable i leaves, p_WA (3,), if it does so along the unit vector t.
+
+    A = F + rho tan(theta / 2) (a + t), so t alone tells, for a wrap theta below half a turn. A
+    cable that wraps farther, whose attachment point is within some 2 rho of the axis, has A on the
+    other side of F; of one along -a the side is unknown, and F is written.
+    """
+    rho = float(points[3, i, 0])
+    x, y, z = 0.0, 0.0, 0.0
+    if rho > 0.0:
+        a = vector(points[2, i])
+        c = dot(a, t)
+        p = less(t, c, a)
+        s = math.sqrt(dot(p, p))
+        if s > 1e-9:
+            e = (p[0] / s, p[1] / s, p[2] / s)
+            x, y, z = away_from_entry(a, rho, (0.0, s, c), e)
+    for j, d in enumerate((x, y, z)):
+        p_WA[j] = points[0, i, j] + d
+
+
+@jit
 def _chord_and_arc(F, a, rho, wrap, e, b):
     """Return the chord AB, from where a cable leaves its pulley, and the arc rho theta."""
     FA = away_from_entry(a, rho, wrap, e)
