@@ -10,11 +10,11 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.errors import EquilibriumError, TensionError
 from cdpr_drake.model.arrays import RobotArrays
-from cdpr_drake.model.cables import CableSet, pose_arrays
+from cdpr_drake.model.cables import CableSet, no_catenary, pose_arrays
 from cdpr_drake.model.catenary import chord_tension
 from cdpr_drake.model.inverse_kinematics import motor_angles
 from cdpr_drake.model.kinematics import cable_geometry
-from cdpr_drake.model.pulleys import has_pulleys, no_catenary
+from cdpr_drake.model.pulleys import has_pulleys
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, as_pose, exp_rotation
 from cdpr_drake.model.statics import (

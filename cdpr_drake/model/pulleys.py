@@ -15,12 +15,12 @@ All functions take AutoDiffXd as well.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from pydrake.math import RigidTransform
+from numpy.typing import NDArray
 
-from cdpr_drake.errors import CableError, GeometryError
+from cdpr_drake.errors import GeometryError
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array
 
@@ -45,18 +45,17 @@ class Contact(NamedTuple):
     tangent: Array
     distance: Array
 
-    def follows(self, robot: CableRobot, p_WB: Array) -> Array:
+    def follows(self, robot: CableRobot, span: Array) -> Array:
         """Return (k, 3, 3): how A moves with B, as a straight cable rolls and swivels after it.
 
         Args:
             robot: the robot.
-            p_WB: (k, 3) [m] where the cables attach.
+            span: (k,) [m] from A to B.
         """
         rho = robot.pulley_radii
         s, c = _dot(self.tangent, self.e), _dot(self.tangent, robot.pulley_axes)
         n = c[:, None] * self.e - s[:, None] * robot.pulley_axes
         aside = np.cross(robot.pulley_axes, self.e)
-        span = _norm(p_WB - self.p_WA)
         roll = (rho / span)[:, None, None] * self.tangent[:, :, None] * n[:, None, :]
         swivel = (rho * (1.0 - c) / self.distance)[:, None, None]
         return roll + swivel * aside[:, :, None] * aside[:, None, :]
@@ -80,9 +79,9 @@ def contact(robot: CableRobot, p_WB: Array, tangents: Array | None = None) -> Co
         GeometryError: an attachment point is inside of a pulley; names the cable.
     """
     rho, a = robot.pulley_radii, robot.pulley_axes
-    to_B = p_WB - robot.drawing_points
-    y = _dot(to_B, a)
-    x = to_B - y[:, None] * a
+    entry_to_B = p_WB - robot.drawing_points
+    y = _dot(entry_to_B, a)
+    x = entry_to_B - y[:, None] * a
     distance = _norm(x)
     e = np.where(_true(distance > NEAREST)[:, None], x / _above(distance)[:, None], _side(a))
     if tangents is None:
@@ -114,37 +113,6 @@ def contact(robot: CableRobot, p_WB: Array, tangents: Array | None = None) -> Co
     return Contact(p_WA, np.where(rho > 0.0, theta, 0.0 * theta), e, tangent, _above(distance))
 
 
-def no_catenary(
-    robot: CableRobot, cable: int, X_WP: RigidTransform, length: float, time: float | None = None
-) -> CableError:
-    """Return the error that says why a cable has no place to hang.
-
-    Args:
-        robot: the robot.
-        cable: its number, from 1.
-        X_WP: the pose.
-        length: [m] total unstrained length.
-        time: of a run [s], or None.
-    """
-    i = cable - 1
-    if robot.pulley_radii[i] > 0.0:
-        p_WB = robot.attachment_points @ X_WP.rotation().matrix().T + X_WP.translation()
-        try:
-            found = contact(robot, p_WB)
-        except GeometryError as error:
-            return CableError(cable, time, str(error))
-        straight = robot.cable.drum_run[i] + robot.pulley_radii[i] * found.theta[i]
-        straight += np.linalg.norm(p_WB[i] - found.p_WA[i])
-        if length > straight:
-            return CableError(
-                cable,
-                time,
-                f"nowhere to leave its pulley: unstrained {length:.6g} m long, where a straight "
-                f"cable has {straight:.6g} m, it would go all the way round",
-            )
-    return CableError(cable, time, f"no catenary of unstrained length {length:.6g} m")
-
-
 def _dot(a: Array, b: Array) -> Array:
     return (a * b).sum(axis=-1)
 
@@ -153,7 +121,7 @@ def _norm(a: Array) -> Array:
     return np.sqrt((a * a).sum(axis=-1))
 
 
-def _true(condition: Array) -> Array:
+def _true(condition: Any) -> NDArray[np.bool_]:
     """Return comparisons of numbers or AutoDiffXd as truth values."""
     return np.asarray(condition, bool)
 

@@ -6,10 +6,9 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from cdpr_drake.errors import CableError
-from cdpr_drake.model.cables import CableSet, packed_sizes
+from cdpr_drake.model.cables import CableSet, no_catenary, packed_sizes
 from cdpr_drake.model.digits import significant
 from cdpr_drake.model.kinematics import cable_geometry
-from cdpr_drake.model.pulleys import no_catenary
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import vector_to_pose
 from cdpr_drake.model.statics import wrench_matrix
@@ -46,8 +45,9 @@ class CatenaryCableForce(LeafSystem):
     Each cable is the exact elastic catenary (Irvine, Cable Structures, 1981) between its
     drawing point A and attachment point B, in series with the run from the drum, which stretches
     with it. Where a cable leaves over a pulley, A is where it does, on a pulley that swivels
-    after it, and the arc round the pulley stretches as the run does. Structural damping resists the rate s at which a cable stretches, as its
-    tension at rest has it, not its gain of chord, which may be loss of sag:
+    after it, and the arc round the pulley stretches as the run does. Structural damping resists
+    the rate s at which a cable stretches, as its tension at rest has it, not its gain of chord,
+    which may be loss of sag:
 
         s = e_B . v_B + e_l dl/dt,   T_d = (E A t_d / l) s,
         force on the platform - e_B T_d,   T_A - e_l T_d,
@@ -109,7 +109,8 @@ class CatenaryCableForce(LeafSystem):
             packed, status, jacobian = self._cables.with_jacobian(*map(value, args))
         if status:
             check_finite(value(args[0]), self, context, "input platform_state")
-            raise_cable_error(self.robot, context, *map(value, args[:2]), packed, status)
+            state, length = value(args[0]), value(args[1])
+            raise_cable_error(self.robot, context, state, length, packed, status)
         output.SetFromVector(packed if jacobian is None else chain(packed, jacobian, *args))
 
 

@@ -40,6 +40,7 @@ Arguments, float64 in SI units:
     length, length_rate: (k,) total unstrained length [m], run included, and its rate [m/s].
     drum_run: (k,) geometric length of the run from the drum to A [m].
     damping_time: [s], t_d below.
+    clamped, linear: Bx as clamped and the linearisation, from `force`.
     out: (k, 14), jacobian: (k, 14, 8), C-contiguous, written.
 
 A status is 0, or 1 + the index of the cable that failed: a number that is not finite or out of

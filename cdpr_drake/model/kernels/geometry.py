@@ -9,7 +9,8 @@ complex ones, so that a complex step differentiates them.
 
 Arguments in common: R (3, 3): orientation of the platform in W; position, omega, velocity (3,) [m,
 rad/s, m/s]: of its origin; points (4, k, 3): as in `model.arrays`; attachment (k, 3) [m]: p_PB; i:
-the cable; a, b, v: vectors, b also the attachment point in W; D (6, k): wrench matrix; p_WB, v_WB
+the cable; a, b, v: vectors, b also the attachment point in W; wrap, e: of a contact as in
+kernels/pulley; D (6, k): wrench matrix; p_WB, v_WB
 (k, 3): attachment points and their velocities in W; F, rho, B: of a pulley as in kernels/pulley;
 AB: the chord, from where a cable leaves to b; T [N]: tension along it; w [N/m]: the cable's weight.
 """
