@@ -73,8 +73,8 @@ def draw_pulley(meshcat: Meshcat, path: str, radius: float, depth: float) -> Non
     scene.draw_bar(meshcat, f"{path}/bridge", *bridge, rod, scene.STEEL)
     axle = ([radius, -cheek, 0.0], [radius, cheek, 0.0])
     scene.draw_bar(meshcat, f"{path}/axle", *axle, 1.2 * rod, scene.STEEL)
-    sleeve = ([0.0, 0.0, low - 0.2 * radius], [0.0, 0.0, low + 0.2 * radius])
-    scene.draw_bar(meshcat, f"{path}/bearing", *sleeve, max(0.15 * radius, depth), scene.STEEL)
+    sleeve = ([0.0, 0.0, low - 0.15 * radius], [0.0, 0.0, low + 0.15 * radius])
+    scene.draw_bar(meshcat, f"{path}/bearing", *sleeve, 0.06 * radius + depth, scene.STEEL)
     _draw_wheel(meshcat, f"{path}/wheel/turning", radius, depth, half)
     meshcat.SetTransform(f"{path}/wheel", wheel_pose(radius))
 
@@ -130,7 +130,7 @@ def wrap_pieces(wraps: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
 
     The first is as long as the least wrap; the others share the rest, and lie over each other and
     the first where the wrap is less than the greatest. They are as many as it takes for none to
-    reach back beyond where the cable enters.
+    reach back beyond where the cable enters, but no more than `MOST`.
 
     Args:
         wraps: theta (n,) [rad].
