@@ -19,7 +19,7 @@ from cdpr_drake.model.pulleys import Contact
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.show import scene
 from cdpr_drake.show.frame import BEARING
-from cdpr_drake.show.meshes import bent_tube, revolved
+from cdpr_drake.show.meshes import TriangleMesh, bent_tube, revolved
 
 WHEEL = (0.20, 0.23, 0.27)
 MARK = (0.95, 0.75, 0.10)
@@ -119,10 +119,20 @@ def draw_wrap(
     spans, angles = wrap_pieces(wraps)
     paths = [f"{path}/wheel/wrap{i + 1}" for i in range(len(spans))]
     for piece, span in zip(paths, spans, strict=True):
-        tube = bent_tube(radius, depth, math.pi - span, math.pi)
-        meshcat.SetTriangleMesh(piece, *tube, Rgba(*grey))
+        meshcat.SetTriangleMesh(piece, *wrap_tube(radius, depth, span), Rgba(*grey))
     meshcat.SetTransform(paths[0], RigidTransform(RotationMatrix.MakeZRotation(angles[0, 0])))
     return paths, angles
+
+
+def wrap_tube(radius: float, depth: float, span: float) -> TriangleMesh:
+    """Return a piece of cable in the frame of its wheel; turned by 0 it ends where cable enters.
+
+    Args:
+        radius: rho [m].
+        depth: radius of the cable [m].
+        span: length of the piece [rad].
+    """
+    return bent_tube(radius, depth, math.pi - span, math.pi)
 
 
 def wrap_pieces(wraps: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
