@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cdpr_drake.model.catenary import cable_shape, elastic_catenary
-from cdpr_drake.model.kinematics import cable_ends
+from cdpr_drake.model.catenary import CableState, cable_shape, elastic_catenary
+from cdpr_drake.model.kinematics import CableEnds, cable_ends
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import vector_to_pose
 
@@ -16,29 +18,76 @@ SEGMENTS = 8
 CABLE_RADIUS = 0.025
 """Of a robot of CoGiRo's size [m]; a cable's own 2 mm could not be seen."""
 
+ROUNDS, CLOSE = 10, 1e-11
+"""At most, in which is found where a hanging cable leaves its pulley, and when it is: its tangent
+does not change any more. Each round leaves a thousandth, or a thirtieth where the axis is tilted.
+"""
+
+
+def hanging_ends(
+    robot: CableRobot,
+    poses: np.ndarray,
+    lengths: np.ndarray,
+    tangents: np.ndarray | None = None,
+) -> list[CableEnds]:
+    """Return the ends of the cables in n states; from pulleys they leave as they hang at rest.
+
+    Args:
+        robot: the robot.
+        poses: (n, 6) [roll, pitch, yaw, x, y, z] (rad, m).
+        lengths: (n, k) [m] unstrained, drum run included.
+        tangents: (n, 3 k) unit vectors along which the cables leave, where they are known.
+
+    Raises:
+        CableError: a length does not exceed the run from the drum.
+        GeometryError: an attachment point is inside of a pulley; names the cable.
+    """
+    known = [None] * len(poses) if tangents is None else tangents.reshape(len(poses), -1, 3)
+    found = []
+    for pose, length, tangent in zip(poses, lengths, known, strict=True):
+        X_WP = vector_to_pose(pose)
+        ends = cable_ends(robot, X_WP, tangent)
+        change = np.inf if ends.contact is not None and tangent is None else 0.0
+        for _ in range(ROUNDS):
+            if ends.contact is None or change < CLOSE:
+                break
+            tangent = _hanging(robot, ends, length).tangent_at_drawing_point
+            change = np.abs(tangent - ends.contact.tangent).max()
+            ends = cable_ends(robot, X_WP, tangent)
+        found.append(ends)
+    return found
+
 
 def cable_shapes(
-    robot: CableRobot, poses: np.ndarray, lengths: np.ndarray, points: int = SEGMENTS + 1
+    robot: CableRobot,
+    poses: np.ndarray,
+    lengths: np.ndarray,
+    points: int = SEGMENTS + 1,
+    ends: Sequence[CableEnds] | None = None,
 ) -> np.ndarray:
     """Return points (n, k, points, 3) [m] in W along the cables of n states, hanging at rest.
+
+    They begin where the cables leave their pulleys, if there are any.
 
     Args:
         robot: the robot.
         poses: (n, 6) [roll, pitch, yaw, x, y, z] (rad, m).
         lengths: (n, k) [m] unstrained, drum run included.
         points: number of points on each cable.
+        ends: of the cables in these states; `hanging_ends` if None.
 
     Raises:
         CableError: a length does not exceed the run from the drum.
+        GeometryError: an attachment point is inside of a pulley; names the cable.
     """
+    ends = hanging_ends(robot, poses, lengths) if ends is None else ends
     w, cable = robot.weight_per_metre, robot.cable
     shapes = np.empty((len(poses), robot.num_cables, points, 3))
-    for shape, pose, length in zip(shapes, poses, lengths, strict=True):
-        ends = cable_ends(robot, vector_to_pose(pose))
-        state = elastic_catenary(ends.chord, length, w, cable.stiffness, cable.drum_run)
+    for shape, length, end in zip(shapes, lengths, ends, strict=True):
+        state = _hanging(robot, end, length)
         shape[:] = cable_shape(
-            ends.p_WA,
-            ends.p_WB,
+            end.p_WA,
+            end.p_WB,
             state.horizontal_tension,
             -state.force_on_platform[:, 2],
             state.unstrained_span_length,
@@ -47,6 +96,14 @@ def cable_shapes(
             points,
         )
     return shapes
+
+
+def _hanging(robot: CableRobot, ends: CableEnds, length: np.ndarray) -> CableState:
+    """Return the state of cables at rest; the run from the drum goes on round the pulley."""
+    cable, run = robot.cable, robot.cable.drum_run
+    if ends.contact is not None:
+        run = run + robot.pulley_radii * ends.contact.theta
+    return elastic_catenary(ends.chord, length, robot.weight_per_metre, cable.stiffness, run)
 
 
 def tension_colours(tension: np.ndarray, limits: tuple[float, float]) -> np.ndarray:

@@ -8,20 +8,29 @@ import time
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydrake.geometry import Cylinder, Meshcat, MeshcatParams, Rgba
-from pydrake.math import RigidTransform
+from pydrake.geometry import Meshcat, MeshcatParams
+from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.analysis.explore import Snapshot, explore_pose
+from cdpr_drake.errors import GeometryError
 from cdpr_drake.model.digits import round_step
-from cdpr_drake.model.kinematics import cable_ends
-from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.kinematics import CableEnds, cable_ends
+from cdpr_drake.model.robot import CableRobot, Pulleys
 from cdpr_drake.model.room import room_of
 from cdpr_drake.model.rotations import as_pose, pose_to_vector
 from cdpr_drake.model.statics import DEFAULT_RULE
 from cdpr_drake.show import scene
-from cdpr_drake.show.cables import CABLE_RADIUS, SEGMENTS, cable_shapes, linear, tension_colours
+from cdpr_drake.show.cables import (
+    CABLE_RADIUS,
+    SEGMENTS,
+    cable_shapes,
+    hanging_ends,
+    linear,
+    tension_colours,
+)
 from cdpr_drake.show.explore_page import HOST, PageServer, panel_html
 from cdpr_drake.show.labels import labels_html
+from cdpr_drake.show.pulleys import draw_pulley, draw_wrap, groove_depths, swivel_pose, turned
 
 POSE = ("roll [deg]", "pitch [deg]", "yaw [deg]", "x [m]", "y [m]", "z [m]")
 """Names of the sliders of the pose, in the order of a pose vector."""
@@ -157,11 +166,17 @@ class Explorer:
         self.meshcat.AddSlider(name, low, high, step, value)
 
     def _draw_bars(self) -> None:
-        """Draw bars of length 1, to be placed and stretched."""
-        bar = Cylinder(CABLE_RADIUS * scene.drawing_scale(self._room), 1.0)
-        for cable in range(self._robot.num_cables):
+        """Draw pulleys, and bars of length 1, to be placed and stretched."""
+        radius = CABLE_RADIUS * scene.drawing_scale(self._room)
+        self._depths = groove_depths(self._robot, radius)
+        for cable, depth in enumerate(self._depths):
             for segment in range(SEGMENTS):
-                self.meshcat.SetObject(_bar_path(cable, segment), bar, Rgba(0.5, 0.5, 0.5))
+                path = _bar_path(cable, segment)
+                scene.draw_unit_bar(self.meshcat, path, radius if segment else depth, radius)
+            if self._robot.pulley_radii[cable] > 0.0:
+                draw_pulley(
+                    self.meshcat, _pulley_path(cable), self._robot.pulley_radii[cable], depth
+                )
 
     def _draw(self, snapshot: Snapshot) -> None:
         if snapshot.robot is not self._drawn:
@@ -185,13 +200,18 @@ class Explorer:
         """Draw the cables at rest, coloured by tension; where there is no rest, grey chords."""
         robot = snapshot.robot
         if snapshot.answers is None:
-            ends = cable_ends(robot, snapshot.pose)
+            ends = _chords(robot, snapshot.pose)
             along = np.linspace(0.0, 1.0, SEGMENTS + 1)[:, None]
             shapes = ends.p_WA[:, None] + along * np.asarray(ends.chord)[:, None]
             colours = np.full((robot.num_cables, 3), 0.5)
+            lengths = robot.cable.drum_run + np.linalg.norm(ends.chord, axis=1)
+            if ends.contact is not None:
+                lengths = lengths + robot.pulley_radii * ends.contact.theta
         else:
-            rest, pose = snapshot.answers.rest.rest, pose_to_vector(snapshot.pose)
-            shapes = cable_shapes(robot, pose[None], rest.unstrained_length[None])[0]
+            pose = pose_to_vector(snapshot.pose)[None]
+            lengths = snapshot.answers.rest.rest.unstrained_length
+            (ends,) = hanging_ends(robot, pose, lengths[None])
+            shapes = cable_shapes(robot, pose, lengths[None], ends=[ends])[0]
             colours = linear(tension_colours(snapshot.answers.tension, limits))
         for cable, (points, colour) in enumerate(zip(shapes, colours, strict=True)):
             for segment in range(SEGMENTS):
@@ -199,7 +219,36 @@ class Explorer:
                 X, length = scene.bar_pose(points[segment], points[segment + 1])
                 self.meshcat.SetTransform(path, X)
                 self.meshcat.SetProperty(path, "scale", [1.0, 1.0, length])
-                self.meshcat.SetProperty(f"{path}/<object>", "color", [*colour.tolist(), 1.0])
+                self._colour(path, colour)
+        self._draw_pulleys(robot, ends, turned(robot, lengths), colours)
+
+    def _draw_pulleys(
+        self, robot: CableRobot, ends: CableEnds, angles: np.ndarray, colours: np.ndarray
+    ) -> None:
+        """Swivel the pulleys, turn them by angles (k,) [rad], and draw the cables round them."""
+        for cable in np.flatnonzero(robot.pulley_radii).tolist():
+            path, rho = _pulley_path(cable), robot.pulley_radii[cable]
+            self.meshcat.SetProperty(path, "visible", ends.contact is not None)
+            if ends.contact is None:
+                continue
+            self.meshcat.SetTransform(path, swivel_pose(robot, ends.contact, cable))
+            turn = RigidTransform(RotationMatrix.MakeZRotation(angles[cable]))
+            self.meshcat.SetTransform(f"{path}/wheel/turning", turn)
+            wrap = ends.contact.theta[cable : cable + 1]
+            pieces, _ = draw_wrap(self.meshcat, path, rho, self._depths[cable], wrap)
+            for piece in (f"{path}/run", *pieces):
+                self._colour(piece, colours[cable])
+
+    def _colour(self, path: str, colour: np.ndarray) -> None:
+        self.meshcat.SetProperty(f"{path}/<object>", "color", [*colour.tolist(), 1.0])
+
+
+def _chords(robot: CableRobot, pose: RigidTransform) -> CableEnds:
+    """Return the ends of straight cables, without the pulleys if the platform is inside of one."""
+    try:
+        return cable_ends(robot, pose)
+    except GeometryError:
+        return cable_ends(robot.replace(pulleys=Pulleys()), pose)
 
 
 def _meshcat(port: int) -> Meshcat:
@@ -215,6 +264,10 @@ def _meshcat(port: int) -> Meshcat:
 
 def _bar_path(cable: int, segment: int) -> str:
     return f"/cables/{cable + 1}/{segment + 1}"
+
+
+def _pulley_path(cable: int) -> str:
+    return f"/pulleys/{cable + 1}"
 
 
 def _fine(step: float) -> float:

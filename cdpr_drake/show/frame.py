@@ -1,5 +1,7 @@
 """What holds the drawing points up in a drawing: posts around the robot, beams over it.
 
+A pulley is held by its bearing, which is a little before the drawing point, where a cable enters.
+
 A post stands behind each group of neighbouring drawing points, as high as its highest; the others
 of the group are on short arms. No post stands where the platform moves: drawing points in the
 middle hang from beams between the posts, and where there are none, from a portal.
@@ -30,6 +32,9 @@ STUB = 0.3
 LEAST = 1e-3
 """Shorter bars, over the room's size, are left out."""
 
+BEARING = 0.75
+"""How far before its entry point a pulley is held, over its radius."""
+
 POST, BEAM, ARM = 1.0, 0.6, 0.4
 """Thickness over that of a post."""
 
@@ -55,11 +60,12 @@ def frame_bars(robot: CableRobot, room: Room) -> list[Bar]:
         robot: the robot.
         room: it stands in.
     """
-    middle = robot.drawing_points[:, :2].mean(axis=0)
+    held = robot.drawing_points - BEARING * robot.pulley_radii[:, None] * robot.pulley_axes
+    middle = held[:, :2].mean(axis=0)
     B = robot.attachment_points[:, :2]
     clear = float(np.linalg.norm(B - B.mean(axis=0), axis=1).max()) + 0.02 * room.size
-    ceiling = float(robot.drawing_points[:, 2].max())
-    groups = _groups(robot.drawing_points)
+    ceiling = float(held[:, 2].max())
+    groups = _groups(held)
     outer = [g for g in groups if _reaches_out(g, groups, middle, clear)]
     inner = [g for g in groups if not any(g is o for o in outer)]
     low = room.floor + STUB * (ceiling - room.floor)

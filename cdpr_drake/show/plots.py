@@ -181,9 +181,12 @@ def cable_sag(record: Record, robot: CableRobot) -> np.ndarray:
         robot: the robot.
     """
     k, w = robot.num_cables, robot.weight_per_metre
-    p_AB = np.array([cable_ends(robot, vector_to_pose(pose)).chord for pose in record["pose"]])
-    Bx, Bz = np.hypot(p_AB[..., 0], p_AB[..., 1]), p_AB[..., 2]
     u_A = record["tangents_at_drawing_point"].reshape(-1, k, 3)
+    ends = [
+        cable_ends(robot, vector_to_pose(p), u) for p, u in zip(record["pose"], u_A, strict=True)
+    ]
+    p_AB = np.array([end.chord for end in ends])
+    Bx, Bz = np.hypot(p_AB[..., 0], p_AB[..., 1]), p_AB[..., 2]
     H = record["tension_at_drawing_point"] * np.hypot(u_A[..., 0], u_A[..., 1])
     # A cable that hangs in a deep loop has no sag from a chord worth the name.
     taut = (w * Bx / 20.0 < H) & (Bx > 0.0)

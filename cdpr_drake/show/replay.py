@@ -10,11 +10,12 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydrake.geometry import Cylinder, Meshcat, MeshcatAnimation, MeshcatParams, Rgba
+from pydrake.geometry import Meshcat, MeshcatAnimation, MeshcatParams
 from pydrake.math import RigidTransform
 
 from cdpr_drake.diagrams import Record
 from cdpr_drake.model.digits import significant
+from cdpr_drake.model.kinematics import CableEnds
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.room import Room, room_of
 from cdpr_drake.model.rotations import as_pose, vector_to_pose
@@ -25,10 +26,18 @@ from cdpr_drake.show.cables import (
     SEGMENTS,
     cable_shapes,
     css,
+    hanging_ends,
     linear,
     tension_colours,
 )
 from cdpr_drake.show.overlay import Legend, add_legend
+from cdpr_drake.show.pulleys import (
+    draw_pulley,
+    draw_wrap,
+    groove_depths,
+    swivel_pose,
+    turned,
+)
 
 Colour = tuple[float, float, float]
 
@@ -56,8 +65,10 @@ def write_replay(
     """Write a run as one HTML file, played in a browser without a server or network.
 
     Cables are elastic catenaries between the recorded ends with the recorded lengths, coloured by
-    the tension at the drawing point. "#t=12.5" at the end of the page's address stops the replay at
-    that time of the run. Frames show recorded states; the player interpolates between them.
+    the tension at the drawing point. From pulleys they leave along the recorded tangents, if there
+    are any; pulleys swivel with them, and turn as the lengths say. "#t=12.5" at the end of the
+    page's address stops the replay at that time of the run. Frames show recorded states; the player
+    interpolates between them.
 
     Args:
         path: of the file, which is replaced if it exists.
@@ -89,8 +100,8 @@ def write_replay(
     poses = [X_WP for run in (record, *others.values()) for X_WP in _some_poses(run)]
     room = room_of(robot, poses if goal is None else [*poses, goal])
     scene.draw_surroundings(meshcat, robot, room, scene.BESIDE_LEGEND)
-    entries = _add_run(meshcat, animation, robot, room, record, index)
-    _animate_colours(animation, tension_colours(tension, limits))
+    colours = tension_colours(tension, limits)
+    entries = _add_run(meshcat, animation, robot, room, record, index, colours)
     if goal is not None:
         scene.draw_platform(meshcat, "/goal", robot, room, scene.GOAL, ghost=True)
         meshcat.SetTransform("/goal", goal)
@@ -195,15 +206,27 @@ def _add_run(
     room: Room,
     record: Record,
     index: np.ndarray,
+    colours: np.ndarray,
 ) -> list[tuple[str, Colour]]:
-    """Draw and animate platform and cables at some samples; return what the legend is to say."""
+    """Draw and animate platform, cables and pulleys at some samples; return the legend's entries.
+
+    The cables have colours (n, k, 3) at these samples.
+    """
     poses = record["pose"]
     scale = scene.drawing_scale(room)
     scene.draw_platform(meshcat, "/run/platform", robot, room, scene.PLATFORM)
     _animate_body(animation, "/run/platform", poses[index])
     scene.draw_path(meshcat, "/run/path", poses[:, 3:], PATH_RADIUS * scale, scene.PLATFORM)
-    shapes = cable_shapes(robot, poses[index], record["unstrained_length"][index])
-    _animate_cables(meshcat, animation, shapes, scale)
+    poses, lengths = poses[index], record["unstrained_length"][index]
+    tangents = record.signals.get("tangents_at_drawing_point")
+    ends = hanging_ends(robot, poses, lengths, None if tangents is None else tangents[index])
+    radius = CABLE_RADIUS * scale
+    depths = groove_depths(robot, radius)
+    shapes = cable_shapes(robot, poses, lengths, ends=ends)
+    _animate_cables(meshcat, animation, shapes, radius, depths)
+    angles = turned(robot, lengths)
+    wraps = _animate_pulleys(meshcat, animation, robot, ends, angles, depths)
+    _animate_colours(animation, colours, wraps)
     entries: list[tuple[str, Colour]] = [("platform and its path", scene.PLATFORM)]
     if robot.payload.mass > 0.0:
         entries.append((f"payload, {significant(robot.payload.mass)} kg", scene.PAYLOAD))
@@ -235,22 +258,60 @@ def _animate_body(animation: MeshcatAnimation, path: str, poses: np.ndarray) -> 
 
 
 def _animate_cables(
-    meshcat: Meshcat, animation: MeshcatAnimation, shapes: np.ndarray, scale: float
+    meshcat: Meshcat,
+    animation: MeshcatAnimation,
+    shapes: np.ndarray,
+    radius: float,
+    depths: np.ndarray,
 ) -> None:
-    """Draw bars of length 1, which the animation places and stretches."""
-    bar = Cylinder(CABLE_RADIUS * scale, 1.0)
+    """Draw bars of length 1, which the animation places and stretches.
+
+    Cables are as thin where they leave as the grooves (k,) [m] of pulleys are deep.
+    """
     frames, cables, points, _ = shapes.shape
     for cable in range(cables):
         for segment in range(points - 1):
             path = _segment_path(cable, segment)
-            meshcat.SetObject(path, bar, Rgba(0.5, 0.5, 0.5))
+            scene.draw_unit_bar(meshcat, path, radius if segment else depths[cable], radius)
             for frame in range(frames):
                 X, length = scene.bar_pose(*shapes[frame, cable, segment : segment + 2])
                 animation.SetTransform(frame, path, X)
                 animation.SetProperty(frame, path, "scale", [1.0, 1.0, length])
 
 
-def _animate_colours(animation: MeshcatAnimation, colours: np.ndarray) -> None:
+def _animate_pulleys(
+    meshcat: Meshcat,
+    animation: MeshcatAnimation,
+    robot: CableRobot,
+    ends: list[CableEnds],
+    angles: np.ndarray,
+    depths: np.ndarray,
+) -> dict[int, list[str]]:
+    """Draw pulleys that swivel, and turn by angles (n, k) [rad], and the cables round them.
+
+    A wheel may turn more than once from frame to frame: the player interpolates between angles, as
+    it could not between orientations. Returned are the paths of the cables round the pulleys.
+    """
+    contacts = [end.contact for end in ends if end.contact is not None]
+    wraps: dict[int, list[str]] = {}
+    for cable in np.flatnonzero(robot.pulley_radii).tolist():
+        path, rho = f"/run/pulley{cable + 1}", robot.pulley_radii[cable]
+        draw_pulley(meshcat, path, rho, depths[cable])
+        theta = [contact.theta[cable] for contact in contacts]
+        pieces, ends_at = draw_wrap(meshcat, path, rho, depths[cable], theta)
+        for frame, contact in enumerate(contacts):
+            animation.SetTransform(frame, path, swivel_pose(robot, contact, cable))
+            wheel = f"{path}/wheel/turning"
+            animation.SetProperty(frame, wheel, "rotation[z]", float(angles[frame, cable]))
+            for piece, angle in list(zip(pieces, ends_at[frame], strict=True))[1:]:
+                animation.SetProperty(frame, piece, "rotation[z]", float(angle))
+        wraps[cable] = [f"{path}/run", *pieces]
+    return wraps
+
+
+def _animate_colours(
+    animation: MeshcatAnimation, colours: np.ndarray, wraps: Mapping[int, list[str]]
+) -> None:
     """Record colours (n, k, 3) of the cables, at some frames and the last.
 
     Every track must end at the last frame: each loops by itself.
@@ -259,9 +320,9 @@ def _animate_colours(animation: MeshcatAnimation, colours: np.ndarray) -> None:
     values = linear(colours)
     for frame in sorted({*range(0, last, COLOUR_PERIOD), last}):
         for cable, colour in enumerate(values[frame]):
-            for segment in range(SEGMENTS):
-                path = f"{_segment_path(cable, segment)}/<object>"
-                animation.SetProperty(frame, path, "material.color", colour.tolist())
+            paths = [_segment_path(cable, segment) for segment in range(SEGMENTS)]
+            for path in paths + wraps.get(cable, []):
+                animation.SetProperty(frame, f"{path}/<object>", "material.color", colour.tolist())
 
 
 def _segment_path(cable: int, segment: int) -> str:

@@ -16,11 +16,13 @@ from pydrake.geometry import Box, Cylinder, Meshcat, Rgba, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.model.digits import round_step, significant
+from cdpr_drake.model.pulleys import has_pulleys
 from cdpr_drake.model.robot import CableRobot, RigidBody
 from cdpr_drake.model.room import Room
 from cdpr_drake.show.cables import css
 from cdpr_drake.show.frame import frame_bars
 from cdpr_drake.show.labels import Label
+from cdpr_drake.show.meshes import tapered_bar
 
 STEEL = (0.45, 0.48, 0.52)
 PLATFORM = (0.10, 0.30, 0.60)
@@ -83,6 +85,8 @@ def drawing_scale(room: Room) -> float:
 def draw_surroundings(meshcat: Meshcat, robot: CableRobot, room: Room, window: Window) -> None:
     """Draw floor, frame, drawing points, axes and the fixed camera, and place the viewer.
 
+    Pulleys, which move, are not among it; see `pulleys.draw_pulley`.
+
     Args:
         meshcat: where to draw.
         robot: the robot.
@@ -100,6 +104,8 @@ def draw_surroundings(meshcat: Meshcat, robot: CableRobot, room: Room, window: W
         radius = 0.06 * scale * bar.thickness
         draw_bar(meshcat, f"/robot/frame{i + 1}", bar.start, bar.end, radius, STEEL)
     for i, point in enumerate(robot.drawing_points):
+        if robot.pulley_radii[i] > 0.0:
+            continue  # it is in the pulley
         path = f"/robot/drawing_point{i + 1}"
         meshcat.SetObject(path, Sphere(0.07 * scale), Rgba(*STEEL))
         meshcat.SetTransform(path, RigidTransform(point))
@@ -141,6 +147,8 @@ def scale_note(robot: CableRobot, room: Room) -> str:
     """
     step = significant(grid_step(room))
     note = f"Grid of {step} m, axes of W. Cables and frame are drawn thicker than they are."
+    if has_pulleys(robot):
+        note += " Pulleys are drawn at their size."
     if np.ptp(robot.attachment_points, axis=0).max() < LEAST * room.size:
         note += " The ball stands for a platform too small to be seen."
     return note
@@ -317,6 +325,22 @@ def draw_bar(
         return
     meshcat.SetObject(path, Cylinder(radius, length), Rgba(*colour, opacity))
     meshcat.SetTransform(path, X)
+
+
+def draw_unit_bar(meshcat: Meshcat, path: str, start: float, end: float) -> None:
+    """Draw a grey bar of length 1 along z, to be placed, stretched and coloured.
+
+    Args:
+        meshcat: where to draw.
+        path: of the bar.
+        start: radius at its lower end [m].
+        end: radius at its upper end [m].
+    """
+    grey = Rgba(0.5, 0.5, 0.5)
+    if start == end:
+        meshcat.SetObject(path, Cylinder(end, 1.0), grey)
+    else:
+        meshcat.SetTriangleMesh(path, *tapered_bar(start, end), grey)
 
 
 def bar_pose(start: ArrayLike, end: ArrayLike) -> tuple[RigidTransform, float]:
