@@ -19,6 +19,8 @@ from cdpr_drake.model.inverse_kinematics import InverseKinematics
 from cdpr_drake.model.kinematics import cable_ends
 from cdpr_drake.model.pulley_beliefs import BELIEFS, LARGER, TILT
 from cdpr_drake.model.robot import CableRobot, load_robot
+from cdpr_drake.model.statics import MINIMUM_NORM
+from cdpr_drake.runs import paper_test
 from cdpr_drake.runs.moves import move_near_the_middle
 from cdpr_drake.runs.pulley_study import PulleyStudy, pulley_study
 from cdpr_drake.show import pulley_figure
@@ -147,11 +149,8 @@ def test_eyelets_at_the_entry_cost_most_and_vision_takes_the_error_away(
 
 
 @pytest.mark.slow
-def test_test_4_costs_what_was_published() -> None:
+def test_what_test_4_costs() -> None:
     """26 mm for the entry point and 0.7 mm for the contact at the start, under JSC."""
-    from cdpr_drake.model.statics import MINIMUM_NORM
-    from cdpr_drake.runs import paper_test
-
     robot, test = load_robot("cogiro-2015-pulleys"), paper_test(4)
     names = ("true", "entry point", "point at the start")
     found = pulley_study(

@@ -38,7 +38,8 @@ FIELDS = {
 def _add_arguments(parser: ArgumentParser) -> None:
     what = parser.add_argument_group("what moves, and where")
     what.add_argument("--robot", metavar="NAME|FILE", default=ROBOT,
-                      help=f"a built-in robot, or a robot file, with pulleys (default: {ROBOT})")  # fmt: skip
+                      help="a built-in robot, or a robot file, with pulleys (default: "
+                      f"{ROBOT})")  # fmt: skip
     what.add_argument("--payload", **common.PAYLOAD)
     what.add_argument("--test", type=int, metavar="N",
                       help="one of the paper's Tests 1 to 5: poses, payload, gain (default: a "
@@ -55,7 +56,8 @@ def _add_arguments(parser: ArgumentParser) -> None:
                      help="lambda [1/s] (default: that of --test; else the robot file's; else 0.1, "
                      "or half the limit at the goal if that is less)")  # fmt: skip
     how.add_argument("--until", type=common.positive(" s"), metavar="S",
-                     help="time of each run (default: 12 time constants, at most 400 s)")  # fmt: skip
+                     help="time of each run (default: 12 time constants, at most "
+                     "400 s)")  # fmt: skip
     how.add_argument("--max-step", **common.MAX_STEP)
     common.add_output(parser)
 

@@ -240,12 +240,13 @@ def _cost(name: str, believed: CableRobot, done: Run, exact: Run) -> BeliefCost:
     setup, summary = done.setup, done.summary
     apart = np.linalg.norm(_positions(done) - _positions(exact), axis=1)
     tension, right = (r.record["tension_at_drawing_point"] for r in (done, exact))
-    seen: dict[str, float] = {}
+    seen: dict[str, Any] = {}
     if setup.is_vision_based:
-        law = {"cable_model": str(setup.loop.cable_model), "tensions": setup.tensions}
+        law: dict[str, Any] = {"cable_model": setup.loop.cable_model, "tensions": setup.tensions}
         rates = gain_matrix(setup.robot, believed, setup.goal, **law).eigenvalues.real
         aside = led_aside(done.record["pose_error"], exact.record["pose_error"])[1]
-        seen = {"slowest": rates.min(), "fastest": rates.max(), "led_aside": 1e3 * aside}
+        seen = {"slowest": float(rates.min()), "fastest": float(rates.max())}
+        seen["led_aside"] = 1e3 * aside
     return BeliefCost(
         belief=name,
         controller=setup.loop.controller,
@@ -253,7 +254,7 @@ def _cost(name: str, believed: CableRobot, done: Run, exact: Run) -> BeliefCost:
         orientation_error=summary.orientation_error,
         apart=1e3 * float(apart.max()),
         tension_change=100.0 * float(np.abs(tension / right - 1.0).max()),
-        **{key: float(value) for key, value in seen.items()},
+        **seen,
     )
 
 

@@ -86,13 +86,13 @@ def _title(study: PulleyStudy) -> str:
 
 
 def _draw_costs(axes: Axes, study: PulleyStudy, metric: str) -> None:
-    """Draw one metric of all beliefs; the true one costs nothing where others are compared to it."""
+    """Draw one metric of all beliefs; the true one where others are not compared with it."""
     names = list(study.of("JSC"))
     values = {c: _values(study.of(c), metric) for c in CONTROLLERS}
     for i, name in enumerate(names):
         pair = sorted((found[name], c) for c, found in values.items() if name in found)
         if i == 0 and not any(value for value, _ in pair):
-            place = {"transform": axes.get_yaxis_transform(), "va": "center"}
+            place: dict[str, Any] = {"transform": axes.get_yaxis_transform(), "va": "center"}
             axes.text(0.04, 0.0, "the reference", fontsize=8.5, color="0.35", **place)
             continue
         shown = [max(value, LEAST) for value, _ in pair]
