@@ -26,6 +26,7 @@ QUICK = {
     "peers_equilibrium": ["--count", "1000", "--poses", "2", "--rounds", "2"],
     "peers_linearize": ["--rounds", "5"],
     "peers_loop": ["--until", "5", "--rounds", "2"],
+    "pulleys": ["--rounds", "3", "--until", "5"],
     "rendered_loop": ["--gain", "0.8", "--until", "8"],
     "scale": ["--rounds", "3", "--work", "8", "--until", "10"],
     "study": ["--duration", "10", "--robots", "3"],

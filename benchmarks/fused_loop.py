@@ -134,7 +134,7 @@ class FusedLoop:
         )
         self.law = (
             cable_model_index("SCMWE"), 4, np.array([np.inf, np.inf]), arrays.points, arrays.body,
-            arrays.stiffness, np.zeros(k), arrays.target,
+            arrays.stiffness, np.full(k, -1.0), arrays.target,
             0.5 * cable.min_tension, cable.max_tension,
         )  # fmt: skip
         self.sigmas = np.array(

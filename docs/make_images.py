@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from cdpr_drake.__main__ import main
 from cdpr_drake.analysis import compare_cable_models
-from cdpr_drake.analysis.calibration_study import GROUPS, calibration_effect
+from cdpr_drake.analysis.calibration_study import calibration_effect, groups_of
 from cdpr_drake.diagrams import make_vision_based_control
 from cdpr_drake.model.catenary import elastic_catenary
 from cdpr_drake.model.equilibrium import rest_state
@@ -61,7 +61,8 @@ def make_images() -> None:
 
 def calibration_study(robot: CableRobot) -> Figure:
     """Return what 40 random calibrations of each kind and size do to Test 4."""
-    cases = [(group, 1.0) for group in GROUPS] + [("all", 3.0), ("all", 10.0), ("all", 30.0)]
+    cases = [(group, 1.0) for group in groups_of(robot)]
+    cases += [("all", 3.0), ("all", 10.0), ("all", 30.0)]
     move = (robot, *paper_test(4).poses(robot))
     return calibration_study_figure([calibration_effect(*move, *c, range(40)) for c in cases])
 

@@ -78,7 +78,7 @@ def covered(robot: CableRobot, cable: int, station: float, shape: tuple[int, int
     geometry = StereoGeometry(robot)
     camera, point, tangent = geometry.lefts[cable], np.empty(3), np.empty(3)
     w, EA = robot.weight_per_metre, geometry.stiffness(T)[cable]
-    A = geometry.drawing[cable]
+    A = geometry.leaving(u)[cable]
     stereo.cable_point(A, u[cable], T[cable], w, EA, station, point, tangent)
     middle, J = np.empty(2), np.empty((2, 3))
     vision.project(camera, point, middle, J)
@@ -137,7 +137,7 @@ def test_the_cable_goes_on_to_the_border_and_begins_at_the_drawing_point() -> No
     tilted = robot.replace(cameras=robot.cameras.replace(stereo_pairs=(pair, *pairs[1:])))
     geometry = StereoGeometry(tilted)
     start, J = np.empty(2), np.empty((2, 3))
-    vision.project(geometry.lefts[0], geometry.drawing[0], start, J)
+    vision.project(geometry.lefts[0], robot.drawing_points[0].copy(), start, J)
     left = CableDrawing(tilted)(u, T)[0][0]
     x, y = np.round(start).astype(int)
     assert 100 < y < 900

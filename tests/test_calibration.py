@@ -244,6 +244,21 @@ def test_a_seed_gives_one_calibration(robot: CableRobot) -> None:
     assert not any(g.name.startswith("X_FL") for g in one.groups)
 
 
+def test_with_pulleys_the_entry_points_are_found_and_the_radius_is_taken_as_known(
+    capsys: pytest.CaptureFixture[str], here: Path
+) -> None:
+    robot = with_pairs(load_robot("cogiro-2015-pulleys"), 0)
+    found = calibrate(robot, QUICK.replace(scale=0.0))
+    np.testing.assert_allclose(found.robot.drawing_points, robot.drawing_points, atol=1e-9)
+    assert found.robot.pulleys == robot.pulleys
+    assert "where the cable enters its pulley" in found.robot.sources["drawing_points"]
+    for name, is_said in (("cogiro-2015-pulleys", True), ("cogiro", False)):
+        (here / "robot.yaml").write_text(with_pairs(load_robot(name), 0).to_yaml())
+        assert main(["calibrate", "--robot", "robot.yaml", "--no-noise", "--no-figures"]) == 0
+        told = " ".join(capsys.readouterr().out.split())
+        assert ("A_i is where a cable enters its pulley" in told) == is_said
+
+
 @pytest.mark.parametrize("name", ["cogiro", "cogiro-2015-pulleys", "cogiro-98m"])
 def test_the_platform_can_take_the_poses(name: str) -> None:
     robot = load_robot(name)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cdpr_drake.model.calibration_errors import CalibrationErrors, misjudged
-from cdpr_drake.model.robot import CableRobot, load_robot
+from cdpr_drake.model.robot import CableRobot, Pulleys, load_robot
 from cdpr_drake.model.rotations import Array, log_rotation
 
 ERRORS = CalibrationErrors()
@@ -24,12 +24,13 @@ def differences(robot: CableRobot, seed: int) -> dict[str, Array]:
         "camera_position": X_FW_believed.translation() - X_FW.translation(),
         "camera_angle": log_rotation((X_FW.inverse() @ X_FW_believed).rotation().matrix()),
         "target_position": X_MP_believed.translation() - X_MP.translation(),
+        "pulley_radius": (believed.pulley_radii - robot.pulley_radii)[:1],
         "target_angle": log_rotation((X_MP.inverse() @ X_MP_believed).rotation().matrix()),
     }
 
 
 def test_each_error_has_its_size() -> None:
-    robot = load_robot("cogiro")
+    robot = load_robot("cogiro-2015-pulleys")
     drawn = [differences(robot, seed) for seed in range(300)]
     for name, sigma in vars(ERRORS).items():
         values = np.array([d[name].ravel() for d in drawn])
@@ -48,6 +49,22 @@ def test_a_seed_gives_one_calibration_in_any_size() -> None:
     nothing = misjudged(robot, ERRORS.scaled(0.0), 3)
     np.testing.assert_array_equal(nothing.drawing_points, robot.drawing_points)
     assert nothing.cameras.X_WF.IsNearlyEqualTo(robot.cameras.X_WF, 1e-15)
+
+
+def test_pulleys_are_misjudged_alike_and_eyelets_are_not() -> None:
+    robot = load_robot("cogiro-2015-pulleys")
+    mixed = robot.replace(pulleys=Pulleys(radius=0.05 * (np.arange(8) % 2)))
+    believed = misjudged(mixed, ERRORS, 3)
+    error = believed.pulley_radii - mixed.pulley_radii
+    assert error[1] != 0.0 and not error[::2].any()
+    np.testing.assert_allclose(error[1::2], error[1], rtol=1e-12)
+    np.testing.assert_array_equal(believed.pulley_axes, mixed.pulley_axes)
+    # The other errors do not depend on it, and no radius is below zero.
+    eyelets = misjudged(robot.replace(pulleys=Pulleys()), ERRORS, 3)
+    np.testing.assert_array_equal(believed.drawing_points, eyelets.drawing_points)
+    assert believed.cameras == eyelets.cameras and eyelets.pulleys == Pulleys()
+    far = [misjudged(robot, CalibrationErrors(pulley_radius=1.0), seed) for seed in range(9)]
+    assert min(r.pulley_radii.min() for r in far) == 0.0
 
 
 @pytest.mark.parametrize("value", [-1e-3, np.nan, np.inf])

@@ -8,17 +8,19 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
+from cdpr_drake.analysis import gain_matrix
 from cdpr_drake.analysis.calibration_study import (
     GROUPS,
     calibration_effect,
     errors_of,
     follow,
+    groups_of,
     led_aside,
     stability_factor,
     steady_state_error,
 )
 from cdpr_drake.model.calibration_errors import CalibrationErrors, misjudged
-from cdpr_drake.model.robot import CableRobot
+from cdpr_drake.model.robot import CableRobot, load_robot
 from cdpr_drake.runs import paper_test, run, setup_of_test
 from cdpr_drake.show import calibration_study_figure
 
@@ -107,6 +109,34 @@ def test_effects_are_those_of_the_calibrations_asked_for(cogiro: CableRobot, tes
     assert [t.get_text() for t in figure.axes[0].get_yticklabels()] == ["$B_i$", "$B_i$ × 2"]
     with pytest.raises(ValueError, match="no effects"):
         calibration_study_figure([])
+
+
+def test_a_pulley_s_radius_is_of_robots_that_have_pulleys(cogiro: CableRobot) -> None:
+    assert groups_of(load_robot("cogiro-2015-pulleys")) == tuple(GROUPS)
+    assert set(GROUPS) - set(groups_of(cogiro)) == {"pulley radius"}
+
+
+@pytest.mark.needs("numba")
+def test_a_wrong_radius_of_the_pulleys_leads_a_little_aside() -> None:
+    """0.1 mm for each millimetre, up to a law that ignores the pulleys; none of it is left."""
+    test = paper_test(4)
+    robot = test.carried_by(load_robot("cogiro-2015-pulleys"))
+    move = test.poses(robot)
+    exact = follow(robot, robot, *move)
+    for radius in (0.049, 0.0):
+        believed = robot.replace(pulleys=robot.pulleys.replace(radius=np.array(radius)))
+        assert np.abs(steady_state_error(robot, believed, move[1])).max() < 1e-12
+        way = follow(robot, believed, *move)
+        turned, away = led_aside(way.error, exact.error)
+        assert away == pytest.approx(0.099 * (0.05 - radius), rel=0.02)
+        assert np.degrees(turned) == pytest.approx(0.333 * (0.05 - radius), rel=0.02)
+        change = np.abs(way.tension - exact.tension).max()
+        assert change == pytest.approx(45.6 * (0.05 - radius), rel=0.05)
+    assert gain_matrix(robot, believed, move[1]).is_stable
+    effect = calibration_effect(robot, *move, "pulley radius", seeds=[0, 1])
+    assert effect.position_error.max() < 1e-9 and 0.02 < effect.position_excursion.max() < 0.3
+    figure = calibration_study_figure([effect])
+    assert [t.get_text() for t in figure.axes[0].get_yticklabels()] == ["pulley radius"]
 
 
 @pytest.mark.needs("numba")

@@ -68,11 +68,11 @@ def test_the_piece_near_the_drawing_point_is_the_exact_catenary_s(V_A: float) ->
 
 
 def test_the_edges_are_where_the_line_of_sight_touches_the_cable() -> None:
-    _robot, images, _ = setup()
+    robot, images, _ = setup()
     camera = images._stereo.lefts[0]
     R, p = camera[:9].reshape(3, 3), camera[9:12]
     o = -R.T @ p
-    A = images._stereo.drawing[0]
+    A = robot.drawing_points[0]
     u = np.array([0.7, 0.5, -0.5]) / np.linalg.norm([0.7, 0.5, -0.5])
     radius, plane = 0.05, np.empty((2, 2, 2))
     kernel.edges(camera, A, u, 1e9, 1e-6, 1e15, radius, np.array([0.3, 1.0]), plane)

@@ -1,7 +1,8 @@
 """What wrong calibrations do to vision-based control (section 6.3): random ones, group by group.
 
 Where the platform comes to rest needs no simulation: the law stops when the cameras see the goal,
-so the error is that of the two transforms ^fT_b and ^mT_e alone (eq. 18), whatever A_i and B_i are.
+so the error is that of the two transforms ^fT_b and ^mT_e alone (eq. 18), whatever A_i and B_i and
+the pulleys are.
 The way there is followed without dynamics: lengths by the law, the platform where it then hangs.
 This is the slow loop to within a fraction of a per cent, at a hundredth of the cost.
 
@@ -24,15 +25,20 @@ from cdpr_drake.errors import CdprError, EquilibriumError
 from cdpr_drake.model.calibration_errors import CalibrationErrors, misjudged
 from cdpr_drake.model.camera import true_from_seen
 from cdpr_drake.model.equilibrium import forward_kinematics, platform_balance, rest_state
+from cdpr_drake.model.pulleys import has_pulleys
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, as_pose, pose_to_vector
 from cdpr_drake.model.servo import MotorRateLaw, ServoSettings, pose_error
+
+PULLEYS = "pulley radius"
+"""The group that is of robots with pulleys alone."""
 
 GROUPS: Mapping[str, tuple[str, ...]] = {
     "A_i": ("drawing_points",),
     "B_i": ("attachment_points",),
     "^fT_b": ("camera_position", "camera_angle"),
     "^mT_e": ("target_position", "target_angle"),
+    PULLEYS: ("pulley_radius",),
     "all": tuple(field.name for field in dataclasses.fields(CalibrationErrors)),
 }
 """What is wrong: the fields of `CalibrationErrors` that are kept, the others being zero."""
@@ -96,6 +102,15 @@ class CalibrationEffect:
         """
         values = getattr(self, name)
         return [float(v) for v in np.nanquantile(values, q)]
+
+
+def groups_of(robot: CableRobot) -> tuple[str, ...]:
+    """Return the groups of `GROUPS` that mean something to a robot.
+
+    Args:
+        robot: the robot; only one with pulleys has a radius that can be wrong.
+    """
+    return tuple(group for group in GROUPS if group != PULLEYS or has_pulleys(robot))
 
 
 def errors_of(group: str, errors: CalibrationErrors | None = None) -> CalibrationErrors:

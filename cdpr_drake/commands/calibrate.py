@@ -87,8 +87,15 @@ def _digits(value: float) -> str:
 
 
 def _meaning(found: Calibration) -> str:
+    from cdpr_drake.model.pulleys import has_pulleys
+
     scale = found.setup.scale
     noise = {0.0: "no noise", 1.0: "the usual noise"}.get(scale, f"{scale:g} times the usual noise")
+    pulleys = (
+        " A_i is where a cable enters its pulley, the point that stays as the pulley swivels. "
+        "Radius and axis of the pulleys are not measured but taken from the robot file: where a "
+        "cable leaves is wrong by up to twice what the radius is."
+    )
     return (
         f"{found.true.name} calibrated with {noise}, seed {found.seed}: calibrated less true, and "
         "the standard deviation that the measurements predict: of noise, which calibrating again "
@@ -97,7 +104,7 @@ def _meaning(found: Calibration) -> str:
         "one can say where the cable bends; X_WF and X_PM as well as poses that turn by "
         f"{math.degrees(found.setup.turn):g} deg tell the one from the other, so their errors go "
         "together."
-    )
+    ) + (pulleys if has_pulleys(found.true) else "")
 
 
 def _at_platform(errors: np.ndarray) -> str:

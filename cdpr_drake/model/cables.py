@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from cdpr_drake.errors import EquilibriumError
+from cdpr_drake.errors import CableError, EquilibriumError, GeometryError
 from cdpr_drake.model.arrays import RobotArrays
+from cdpr_drake.model.kinematics import cable_ends
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, rpy_rate_matrix, skew
 
@@ -127,8 +128,40 @@ class CableSet:
             out, jacobian, wrench, stiffness,
         )  # fmt: skip
         if status:
-            raise EquilibriumError(f"cable {status} has no catenary at this pose and length")
+            length = np.asarray(length, float)
+            raise EquilibriumError(str(no_catenary(self.robot, status, X_WP, length[status - 1])))
         return wrench, stiffness, out, jacobian
+
+
+def no_catenary(
+    robot: CableRobot, cable: int, X_WP: RigidTransform, length: float, time: float | None = None
+) -> CableError:
+    """Return the error that says why a cable has no place to hang.
+
+    Args:
+        robot: the robot.
+        cable: its number, from 1.
+        X_WP: the pose.
+        length: [m] total unstrained length.
+        time: of a run [s], or None.
+    """
+    radius = robot.pulley_radii[cable - 1]
+    if radius > 0.0:
+        try:
+            ends = cable_ends(robot, X_WP)
+        except GeometryError as error:
+            return CableError(cable, time, str(error))
+        assert ends.contact is not None
+        straight = robot.cable.drum_run[cable - 1] + radius * ends.contact.theta[cable - 1]
+        straight += np.linalg.norm(ends.chord[cable - 1])
+        if length > straight:
+            return CableError(
+                cable,
+                time,
+                f"nowhere to leave its pulley: unstrained {length:.6g} m long, where a straight "
+                f"cable has {straight:.6g} m, it would go all the way round",
+            )
+    return CableError(cable, time, f"no catenary of unstrained length {length:.6g} m")
 
 
 def pose_arrays(X_WP: RigidTransform) -> tuple[Array, Array]:

@@ -8,6 +8,7 @@ import math
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
+from cdpr_drake.model.pulleys import has_pulleys
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array, exp_rotation
 
@@ -20,12 +21,14 @@ class CalibrationErrors:
     camera together (section 4.3), and prints no accuracies; these are a judgement of them.
 
     Args:
-        drawing_points: of each A_i [m].
+        drawing_points: of each A_i, with a pulley of where the cable enters it [m].
         attachment_points: of each B_i [m].
         camera_position: of ^fT_b, where the origin of F_b is in F_f [m].
         camera_angle: of ^fT_b, how F_b is turned about its origin [rad].
         target_position: of ^mT_e, where the origin of F_e is in F_m [m].
         target_angle: of ^mT_e, how F_e is turned about its origin [rad].
+        pulley_radius: of the pulleys' radius to the cable's centre line, one error for all of them,
+            as they are of one make [m]; nothing to a robot without pulleys.
 
     Raises:
         ValueError: one is negative or not finite.
@@ -37,6 +40,7 @@ class CalibrationErrors:
     camera_angle: float = math.radians(0.1)
     target_position: float = 2.0e-3
     target_angle: float = math.radians(0.1)
+    pulley_radius: float = 1.0e-3
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -55,12 +59,18 @@ def misjudged(robot: CableRobot, errors: CalibrationErrors, seed: int) -> CableR
         robot: the true robot.
         errors: how large the errors are.
         seed: which calibration; the same one gives the same errors, in the same proportion
-            whatever their size.
+            whatever their size. A radius that comes out below zero is believed to be zero, an
+            eyelet.
     """
     draw = np.random.default_rng(seed).standard_normal
     A, B = draw((robot.num_cables, 3)), draw((robot.num_cables, 3))
     turn_f, shift_f, turn_m, shift_m = draw((4, 3))
+    radius_error = errors.pulley_radius * float(draw())
     cameras = robot.cameras
+    if has_pulleys(robot):
+        rho = robot.pulleys.radius
+        rho = np.where(rho > 0.0, np.maximum(rho + radius_error, 0.0), 0.0)
+        robot = robot.replace(pulleys=robot.pulleys.replace(radius=rho))
     return robot.replace(
         drawing_points=robot.drawing_points + errors.drawing_points * A,
         attachment_points=robot.attachment_points + errors.attachment_points * B,

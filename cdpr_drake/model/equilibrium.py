@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.errors import EquilibriumError, TensionError
 from cdpr_drake.model.arrays import RobotArrays
-from cdpr_drake.model.cables import CableSet, pose_arrays
+from cdpr_drake.model.cables import CableSet, no_catenary, pose_arrays
 from cdpr_drake.model.catenary import chord_tension
 from cdpr_drake.model.inverse_kinematics import motor_angles
 from cdpr_drake.model.kinematics import cable_geometry
@@ -37,7 +37,7 @@ class RestState:
 
     Attributes:
         X_WP: the pose.
-        unstrained_length: (k,) [m] with the run from drum to eyelet.
+        unstrained_length: (k,) [m] from the drum on.
         chord_tension: (k,) [N] horizontal tension over cos(beta0).
         tension_at_drawing_point: (k,) [N].
         tension_at_attachment_point: (k,) [N].
@@ -177,7 +177,7 @@ def forward_kinematics(
 
     Args:
         robot: the robot.
-        length: (k,) [m] total unstrained lengths, run from drum to eyelet included.
+        length: (k,) [m] total unstrained lengths, from the drum on.
         guess: a pose to start from, X_WP or [roll, pitch, yaw, x, y, z] (rad, m).
         max_iterations: after how many evaluations to give up.
         wrench: (6,) [torque; force] on the platform at its origin in W, besides weight and cables;
@@ -201,7 +201,8 @@ def forward_kinematics(
         TOLERANCE, max_iterations, out, jacobian, unbalanced,
     )  # fmt: skip
     if status:
-        raise EquilibriumError(f"cable {status} has no catenary at this pose and length")
+        X_WP = RigidTransform(RotationMatrix.ProjectToRotationMatrix(R), p)
+        raise EquilibriumError(str(no_catenary(robot, status, X_WP, length[status - 1])))
     if not residual <= 1e3 * TOLERANCE:
         slackest = int(np.argmin(out[:, 3]))
         raise EquilibriumError(

@@ -32,8 +32,9 @@ class InverseKinematics:
     """Unstrained lengths of a robot's cables at any pose, by one of the paper's cable models.
 
     The horizontal tensions are those of least norm that balance the robot's nominal mass (A.2),
-    within the robot's limits of the tension or whatever they are. Lengths include the run from drum
-    to eyelet, unstretched: l = l_model(pose) + run.
+    within the robot's limits of the tension or whatever they are. Lengths include the arc round a
+    pulley, which stretches where the cable model does, and the run from the drum, unstretched:
+    l = l_model(pose) + arc + run. Cables leave their pulleys along the tangent of the parabola.
 
     Args:
         robot: the robot as the controller knows it.
@@ -137,7 +138,7 @@ def motor_angles(robot: CableRobot, lengths: ArrayLike) -> Array:
 
     Args:
         robot: the robot, for the transmission and the length at encoder zero.
-        lengths: (k,) [m] total unstrained lengths, run from drum to eyelet included.
+        lengths: (k,) [m] total unstrained lengths, from the drum on.
     """
     winch = robot.winch
     return (np.asarray(lengths, float) - winch.encoder_zero_length) / winch.transmission

@@ -136,7 +136,7 @@ def cable_geometry(
     AB_by_B = np.broadcast_to(np.eye(3), (len(L), 3, 3))
     arc = np.zeros(len(L))
     if ends.contact is not None:
-        AB_by_B = R @ (AB_by_B - ends.contact.follows(robot, ends.p_WB)) @ R.T
+        AB_by_B = R @ (AB_by_B - ends.contact.follows(robot, L)) @ R.T
         arc = robot.pulley_radii * ends.contact.theta
     return CableGeometry(
         EB=ends.EB @ R.T,

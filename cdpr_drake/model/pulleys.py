@@ -15,9 +15,10 @@ All functions take AutoDiffXd as well.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cdpr_drake.errors import GeometryError
 from cdpr_drake.model.robot import CableRobot
@@ -44,18 +45,17 @@ class Contact(NamedTuple):
     tangent: Array
     distance: Array
 
-    def follows(self, robot: CableRobot, p_WB: Array) -> Array:
+    def follows(self, robot: CableRobot, span: Array) -> Array:
         """Return (k, 3, 3): how A moves with B, as a straight cable rolls and swivels after it.
 
         Args:
             robot: the robot.
-            p_WB: (k, 3) [m] where the cables attach.
+            span: (k,) [m] from A to B.
         """
         rho = robot.pulley_radii
         s, c = _dot(self.tangent, self.e), _dot(self.tangent, robot.pulley_axes)
         n = c[:, None] * self.e - s[:, None] * robot.pulley_axes
         aside = np.cross(robot.pulley_axes, self.e)
-        span = _norm(p_WB - self.p_WA)
         roll = (rho / span)[:, None, None] * self.tangent[:, :, None] * n[:, None, :]
         swivel = (rho * (1.0 - c) / self.distance)[:, None, None]
         return roll + swivel * aside[:, :, None] * aside[:, None, :]
@@ -79,9 +79,9 @@ def contact(robot: CableRobot, p_WB: Array, tangents: Array | None = None) -> Co
         GeometryError: an attachment point is inside of a pulley; names the cable.
     """
     rho, a = robot.pulley_radii, robot.pulley_axes
-    to_B = p_WB - robot.drawing_points
-    y = _dot(to_B, a)
-    x = to_B - y[:, None] * a
+    entry_to_B = p_WB - robot.drawing_points
+    y = _dot(entry_to_B, a)
+    x = entry_to_B - y[:, None] * a
     distance = _norm(x)
     e = np.where(_true(distance > NEAREST)[:, None], x / _above(distance)[:, None], _side(a))
     if tangents is None:
@@ -121,7 +121,7 @@ def _norm(a: Array) -> Array:
     return np.sqrt((a * a).sum(axis=-1))
 
 
-def _true(condition: Array) -> Array:
+def _true(condition: Any) -> NDArray[np.bool_]:
     """Return comparisons of numbers or AutoDiffXd as truth values."""
     return np.asarray(condition, bool)
 

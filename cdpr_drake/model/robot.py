@@ -166,6 +166,8 @@ class Winch(Record):
         capstan_exponent: [-], friction coefficient times angle of wrap at the drawing point; 0 is
             none.
         capstan_speed: [m/s], cable speed over which the capstan friction builds up.
+        on: what they stand on, "frame"; those that ride on the platform, with drums and pulleys,
+            are not modelled.
     """
 
     transmission: float
@@ -180,6 +182,7 @@ class Winch(Record):
     coulomb_rate: float = 0.1
     capstan_exponent: float = 0.0
     capstan_speed: float = 0.002
+    on: str = "frame"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

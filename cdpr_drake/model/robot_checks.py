@@ -109,6 +109,9 @@ def value_problems(robot: CableRobot) -> Problems:
         yield from _require(robot, path, lambda v: np.isfinite(v) & (v >= 0), ">= 0 and finite")
     if robot.gain is not None:
         yield from _positive(robot, "gain")
+    if robot.winch.on != "frame":
+        text = "must be frame: winches that ride on the platform are not modelled"
+        yield "winch.on", f"{text}, got {robot.winch.on!r}"
     if robot.floor is not None:
         yield from _require(robot, "floor", np.isfinite, "finite")
     for name in ("X_WF", "X_PM"):

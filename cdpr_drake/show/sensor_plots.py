@@ -124,7 +124,7 @@ def calibration_study_figure(effects: Sequence[CalibrationEffect]) -> Figure:
         axes.set_xlabel(title)
         axes.set_xscale("symlog", linthresh=_smallest_decade(effects, name))
         axes.set_xlim(left=0.0)
-    labels = [f"${e.group}$" if e.group != "all" else "all" for e in effects]
+    labels = [f"${e.group}$" if "_" in e.group else e.group for e in effects]
     sizes = [f" × {e.factor:g}" if e.factor != 1.0 else "" for e in effects]
     grid[0].set_yticks(places, [a + b for a, b in zip(labels, sizes, strict=True)])
     grid[0].set_ylim(places[-1] - 0.6, 0.6)

@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from cdpr_drake.errors import CableError
-from cdpr_drake.model.cables import CableSet, packed_sizes
+from cdpr_drake.model.cables import CableSet, no_catenary, packed_sizes
 from cdpr_drake.model.digits import significant
 from cdpr_drake.model.kinematics import cable_geometry
 from cdpr_drake.model.robot import CableRobot
@@ -43,9 +43,11 @@ class CatenaryCableForce(LeafSystem):
         - packed
 
     Each cable is the exact elastic catenary (Irvine, Cable Structures, 1981) between its
-    drawing point A and attachment point B, in series with the run from drum to eyelet, which
-    stretches with it. Structural damping resists the rate s at which a cable stretches, as its
-    tension at rest has it, not its gain of chord, which may be loss of sag:
+    drawing point A and attachment point B, in series with the run from the drum, which stretches
+    with it. Where a cable leaves over a pulley, A is where it does, on a pulley that swivels
+    after it, and the arc round the pulley stretches as the run does. Structural damping resists
+    the rate s at which a cable stretches, as its tension at rest has it, not its gain of chord,
+    which may be loss of sag:
 
         s = e_B . v_B + e_l dl/dt,   T_d = (E A t_d / l) s,
         force on the platform - e_B T_d,   T_A - e_l T_d,
@@ -107,18 +109,25 @@ class CatenaryCableForce(LeafSystem):
             packed, status, jacobian = self._cables.with_jacobian(*map(value, args))
         if status:
             check_finite(value(args[0]), self, context, "input platform_state")
-            raise_cable_error(self.robot, context, value(args[1]), packed, status)
+            state, length = value(args[0]), value(args[1])
+            raise_cable_error(self.robot, context, state, length, packed, status)
         output.SetFromVector(packed if jacobian is None else chain(packed, jacobian, *args))
 
 
 def raise_cable_error(
-    robot: CableRobot, context: Context, length: np.ndarray, packed: np.ndarray, status: int
+    robot: CableRobot,
+    context: Context,
+    state: np.ndarray,
+    length: np.ndarray,
+    packed: np.ndarray,
+    status: int,
 ) -> None:
     """Raise what a status of `CableSet` that is not 0 means.
 
     Args:
         robot: the robot.
         context: of the system that solved for the cables, for the time.
+        state: (12,) or more, the platform's first.
         length: (k,) total unstrained lengths [m].
         packed: as `CableSet` gives it.
         status: likewise.
@@ -129,7 +138,7 @@ def raise_cable_error(
     time = seconds(context)
     cable, k = abs(status), robot.num_cables
     if status > 0:
-        raise CableError(cable, time, f"no catenary of unstrained length {length[cable - 1]:.6g} m")
+        raise no_catenary(robot, cable, vector_to_pose(state[:6]), length[cable - 1], time)
     highest = packed[5 + cable : 6 + 2 * k : k].max()
     limit = robot.cable.breaking_load
     raise CableError(

@@ -241,7 +241,7 @@ class FusedPlant(LeafSystem):
         packed, status = self._cables(y[:12], length, rate)
         if status:
             check_finite(y, self, context, "state")
-            raise_cable_error(self.robot, context, length, packed, status)
+            raise_cable_error(self.robot, context, y, length, packed, status)
         output.SetFromVector(packed)
 
     def _motion(self, y: Array) -> tuple[Array, Array]:

@@ -28,9 +28,9 @@ class InverseKinematicsAngles(LeafSystem):
         output_ports:
         - motor_angles
 
-    q = (l_model(pose) + run - l(0)) / r, with horizontal tensions of least norm for the nominal
-    mass (A.2), within the robot's limits unless the rule says otherwise. All models but the ECM
-    know no stretch: that is joint space control's error.
+    q = (l_model(pose) + arc + run - l(0)) / r, the arc being that round a pulley, with horizontal
+    tensions of least norm for the nominal mass (A.2), within the robot's limits unless the rule
+    says otherwise. All models but the ECM know no stretch: that is joint space control's error.
 
     desired_pose (6) is [roll, pitch, yaw, x, y, z] (rad, m) of X_WP; motor_angles (k) in rad.
 

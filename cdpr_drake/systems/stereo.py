@@ -146,6 +146,7 @@ class StereoTangentCameras(StereoCameras):
     At k T the true cameras see the edges of the sagging cables, drawn from their true tangents and
     tensions, and eq. (17) gives the directions with what the controller believes of the cameras,
     freed of the cables' curvature with the measured tension. The measured pose gives their sign.
+    With pulleys both are of where the cable leaves, which follows from the tangent itself.
     Where a cable is not seen, or its interpretation planes are too nearly one, its last direction
     is held. Tangents (3 k) are unit vectors from A to B in W; tensions (k) are in N; measured_pose
     is [roll, pitch, yaw, x, y, z] (rad, m) of X_WP; noise is standard normal, one number for each

@@ -38,8 +38,8 @@ class WinchDynamics(LeafSystem):
     the torque further out; l = l(0) + r q, q > 0 pays out; T_W = T_A exp(-mu theta tanh(dl/dt /
     v_l)). Friction and capstan are off by default; both are stiff when their speeds are small.
 
-    All ports but state have size k: angles in rad, unstrained length in m with the run from
-    drum to eyelet, torque in N m, tensions in N. State, and the port of that name (3 k):
+    All ports but state have size k: angles in rad, unstrained length in m from the drum
+    on, torque in N m, tensions in N. State, and the port of that name (3 k):
     [angle (k); rate (k); integral (k)].
 
     Args:

@@ -15,6 +15,7 @@ from cdpr_drake.model.calibration.result import Calibration
 from cdpr_drake.model.calibration.setup import CalibrationSetup
 from cdpr_drake.model.calibration.site import Site, platform_poses
 from cdpr_drake.model.calibration.transforms import CalibratedTransforms
+from cdpr_drake.model.pulleys import has_pulleys
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array
 from cdpr_drake.model.vision.cameras import PoseCamera
@@ -37,6 +38,11 @@ def calibrate(
     points of F_b, and clouds of points around each A_i and each B_i. Then tracker and pose cameras
     see the platform in a few poses that turn little. Poses of pose cameras and pairs are found in
     the tracker's frame S.
+
+    With pulleys A_i is found where the cable enters its pulley, not where it leaves, which no
+    tracker can measure once for all: it moves with the platform. Radius and axis of the pulleys are
+    not measured: the calibrated robot has the true ones. `CalibrationErrors.pulley_radius` is for
+    asking what a wrong radius does.
 
     Args:
         robot: the true robot.
@@ -121,9 +127,11 @@ def _believed(
     )
     noise = f"noise of {setup.scale:g} times the usual, seed {seed}" if setup.scale else "no noise"
     views = f"{setup.views} simulated views of a checkerboard"
+    tracker = f"a simulated laser tracker, {setup.cloud} points around each"
+    entry = ", where the cable enters its pulley" if has_pulleys(robot) else ""
     how = {
-        "drawing_points": f"a simulated laser tracker, {setup.cloud} points around each",
-        "attachment_points": f"a simulated laser tracker, {setup.cloud} points around each",
+        "drawing_points": f"{tracker}{entry}",
+        "attachment_points": tracker,
         "cameras.X_WF": "simulated poses of the platform, seen by tracker and cameras",
         "cameras.X_PM": "simulated poses of the platform, seen by tracker and cameras",
         "cameras.pose_cameras": f"{views}, and poses of the platform",

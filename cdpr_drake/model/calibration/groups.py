@@ -32,7 +32,7 @@ class Believed:
 
     Attributes:
         robot: the robot.
-        A: the drawing points.
+        A: the drawing points; with pulleys where the cables enter them.
         B: the attachment points.
         X_WF: the fixed camera frame.
         transforms: the other results of the poses of the platform.

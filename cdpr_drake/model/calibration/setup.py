@@ -16,7 +16,8 @@ class CalibrationSetup:
     (section 4.3); the numbers it does not print are judged here. A tracker errs by 15 um + 6 um/m
     at most, of which a typical error is half (specification of the Leica Absolute Trackers):
     0.05 mm at 15 m. What the tracker cannot tell is where in the eyelet or shackle the cable bends:
-    that is the largest part of the errors of A_i and B_i.
+    that is the largest part of the errors of A_i and B_i. With a pulley A_i is where the cable
+    enters it, the point that stays as the pulley swivels; radius and axis are taken as known.
 
     Args:
         views: of the checkerboard, of each camera or pair.
@@ -27,7 +28,8 @@ class CalibrationSetup:
         corner_noise: of a checkerboard's corner in an image [px].
         tracker_noise: of each coordinate of a point [m].
         cloud_noise: of each coordinate of a point of a cloud, as it is touched [m].
-        drawing_point: how far the cable's bend is from the middle of the cloud, each axis [m].
+        drawing_point: how far the cable's bend, or its entry into the pulley, is from the middle of
+            the cloud, each axis [m].
         attachment_point: the same at the platform [m].
         scale: of all noise, that of the robot's images too; 0 for exact measurements.
 

@@ -148,7 +148,7 @@ class Site:
         return calibrate_pair(held.board, left, right, sizes, setup.corner_noise, tracked)
 
     def measure_points(self) -> tuple[UncertainPose, LocatedPoints, LocatedPoints]:
-        """Return X_WS, the A_i and the B_i."""
+        """Return X_WS, the A_i (with pulleys where the cables enter them), and the B_i."""
         robot, setup = self._robot, self._setup
         references = corners(robot.drawing_points, floor=0.0)
         X_SW = register(references, self.tracker(references), setup.tracker_noise)

@@ -345,7 +345,7 @@ def drawing_point_tension(Bx, Bz, T, w):
 def run_row(run, EA, Bx, Bz, T, w):
     """Return the derivatives of run / (1 + T_A / EA) with respect to (Bx, Bz, T).
 
-    The unstrained length of the run [m] from drum to eyelet, which stretches with the tension T_A.
+    The unstrained length of the run [m] from the drum to A, which stretches with the tension T_A.
     """
     T_A, by_Bx, by_Bz, by_T = drawing_point_tension(Bx, Bz, T, w)
     stretch = 1.0 + T_A / EA

@@ -40,6 +40,7 @@ Arguments, float64 in SI units:
     length, length_rate: (k,) total unstrained length [m], run included, and its rate [m/s].
     drum_run: (k,) geometric length of the run from the drum to A [m].
     damping_time: [s], t_d below.
+    clamped, linear: Bx as clamped and the linearisation, from `force`.
     out: (k, 14), jacobian: (k, 14, 8), C-contiguous, written.
 
 A status is 0, or 1 + the index of the cable that failed: a number that is not finite or out of
@@ -485,16 +486,24 @@ def _leaning_chord(i, p_WA, p_WB):
 
 @jit
 def guess_tangent(i, p_WA, p_WB, length, drum_run, w, stiffness):
-    """Return (t_A, kappa, start): roughly, the unit tangent [-] and the curvature [1/m] of cable i
-    at A, and (H, V_B, l0); for numbers that are no cable's, zeros.
+    """Return (t_A, kappa, start): nearly the unit tangent [-] and the curvature [1/m] of cable i
+    at A, and (H, V_B, l0), after one step of Newton's; for numbers that are no cable's, zeros.
     """
     dx, dy, Bz, Bx, L = _leaning_chord(i, p_WA, p_WB)
     l, run = float(length[i]), float(drum_run[i])
-    law = (float(stiffness[0]), float(stiffness[1]), float(stiffness[2]))
-    if not _admissible(Bx, L, l, run, w, law[0], law[1], law[2]):
+    asymptote, softening, offset = float(stiffness[0]), float(stiffness[1]), float(stiffness[2])
+    if not _admissible(Bx, L, l, run, w, asymptote, softening, offset):
         return (0.0, 0.0, 0.0), 0.0, AFRESH
     w, level = max(w, MIN_WEIGHT), max(Bx, MIN_SLOPE * L)
-    H, V_B, l0 = _guess(level, Bz, L, l, run, w, law[0], law[1], law[2])
+    H, V_B, l0 = _guess(level, Bz, L, l, run, w, asymptote, softening, offset)
+    x, z, r, Kxx, Kxz, Kzx, Kzz, mx, mz, mu, k, _T_A, _T_B, _EA, _dEA = _linearise(
+        H, V_B, l0, l, run, w, asymptote, softening, offset
+    )
+    ex, ez = level - x - mx * r, Bz - z - mz * r
+    dH, dV = Kxx * ex + Kxz * ez, Kzx * ex + Kzz * ez
+    if abs(dH) < 0.1 * H and abs(dV) < 0.1 * H:
+        l0 += mu * r + k * (H * dH + (V_B - w * l0) * dV)
+        H, V_B = H + dH, V_B + dV
     V_A = V_B - w * l0
     T_A = math.sqrt(H * H + V_A * V_A)
     share = H / (level * T_A)

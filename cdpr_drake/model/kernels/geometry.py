@@ -9,7 +9,8 @@ complex ones, so that a complex step differentiates them.
 
 Arguments in common: R (3, 3): orientation of the platform in W; position, omega, velocity (3,) [m,
 rad/s, m/s]: of its origin; points (4, k, 3): as in `model.arrays`; attachment (k, 3) [m]: p_PB; i:
-the cable; a, b, v: vectors, b also the attachment point in W; D (6, k): wrench matrix; p_WB, v_WB
+the cable; a, b, v: vectors, b also the attachment point in W; wrap, e: of a contact as in
+kernels/pulley; D (6, k): wrench matrix; p_WB, v_WB
 (k, 3): attachment points and their velocities in W; F, rho, B: of a pulley as in kernels/pulley;
 AB: the chord, from where a cable leaves to b; T [N]: tension along it; w [N/m]: the cable's weight.
 """
@@ -127,6 +128,28 @@ def away_from_entry(a, rho, wrap, e):
         rho * (s * a[1] + v * e[1]),
         rho * (s * a[2] + v * e[2]),
     )
+
+
+@jit
+def place_leaving(i, points, t, p_WA):
+    """Write where cable i leaves, p_WA (3,), if it does so along the unit vector t.
+
+    A = F + rho tan(theta / 2) (a + t), so t alone tells, for a wrap theta below half a turn. A
+    cable that wraps farther, whose attachment point is within some 2 rho of the axis, has A on the
+    other side of F; of one along -a the side is unknown, and F is written.
+    """
+    rho = float(points[3, i, 0])
+    x, y, z = 0.0, 0.0, 0.0
+    if rho > 0.0:
+        a = vector(points[2, i])
+        c = dot(a, t)
+        p = less(t, c, a)
+        s = math.sqrt(dot(p, p))
+        if s > 1e-9:
+            e = (p[0] / s, p[1] / s, p[2] / s)
+            x, y, z = away_from_entry(a, rho, (0.0, s, c), e)
+    for j, d in enumerate((x, y, z)):
+        p_WA[j] = points[0, i, j] + d
 
 
 @jit

@@ -46,6 +46,9 @@ SETTLED, ROUGHLY = 1e-6, 1e-4
 them the more, the less the matrix of the steps, wrong by part of the bend round the pulley, is off.
 """
 
+TIGHT = 1e-9
+"""Angles [rad] that are not worth another step: they move A by nanometres at most."""
+
 FOUND = 1e-12
 """Angles [rad] at which a search ends."""
 
@@ -54,6 +57,9 @@ ROUNDS = 30
 LARGEST_TURN, LARGEST_SWIVEL = 0.7, 1.0  # rad a step
 
 WALK = 0.1  # of swivel a step [rad]
+
+NOT_HUNG = (True, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+"""What `catenary.force` returns where it has not been called."""
 
 
 @jit
@@ -101,39 +107,45 @@ def _place(i, pulley, wrap, e, p_WA, run):
 
 
 @jit
-def _settle(i, pulley, wrap, e, span, p_WB, v_WB, length, rate, w, law, p_WA, run, out):
+def _settle(
+    i, pulley, wrap, e, span, p_WB, v_WB, length, rate, w, law, damping_time, differs, p_WA, run,
+    out,
+):  # fmt: skip
     """Find the contact from a straight cable's, `span` long, by quasi-Newton steps.
 
-    Return (failed, wrap, e, nearby), the last as `start` of `catenary.force`. The matrix of the
-    first steps is that of a straight cable with the curvature of this one; Broyden's rule improves
-    it.
+    Return (failed, wrap, e, hung), and row i of `out` written there; hung: what `catenary.force`
+    has returned. The matrix of the first steps is that of a straight cable with the curvature of
+    this one; Broyden's rule improves it.
     """
     _F, a, rho, _run, upright = pulley
     _place(i, pulley, wrap, e, p_WA, run)
     t_A, kappa, nearby = guess_tangent(i, p_WA, p_WB, length, run, w, law)
-    theta, s, c = wrap
+    _theta, s, c = wrap
     J11, J12, J21 = -1.0 - a[2] * rho * kappa, 0.0, 0.0
     J22 = -1.0 - rho * (1.0 - c) / max(span * abs(s), 1e-9)
     enough = min(max(SETTLED, 5e-10 / max(rho * kappa, 1e-9)), ROUGHLY)
     r1, r2, turn, swivel = 0.0, 0.0, 0.0, 0.0
-    solves = False
+    solves, is_last, hung = False, False, NOT_HUNG
     for _round in range(ROUNDS):
         if solves:
             _place(i, pulley, wrap, e, p_WA, run)
-            failed, H, V_B, _Bx, _linear = force(
-                i, p_WA, p_WB, v_WB, length, rate, w, law, run, 0.0, False, nearby, out
+            hung = force(
+                i, p_WA, p_WB, v_WB, length, rate, w, law, run, damping_time, differs, nearby, out
             )
-            if failed:  # no span left, or nearly none: back half of the way
+            if hung[0]:  # no span left, or nearly none: back half of the way
                 if max(abs(turn), abs(swivel)) < SETTLED:
-                    return True, wrap, e, nearby
-                turn, swivel, nearby = 0.5 * turn, 0.5 * swivel, AFRESH
+                    return True, wrap, e, hung
+                turn, swivel, nearby, is_last = 0.5 * turn, 0.5 * swivel, AFRESH, False
                 wrap, e = _wrap(wrap[0] - turn), _turned_about(a, e, -swivel)
                 continue
-            nearby = (H, V_B, float(out[i, 13]))
+            nearby = (hung[1], hung[2], float(out[i, 13]))
             t_A = (out[i, 5], out[i, 6], out[i, 7])
         new1, new2 = misfit(a, wrap, e, t_A)
         if upright:
             new2 = 0.0
+        size = max(abs(new1), abs(new2 * wrap[1]))
+        if solves and (is_last or size < TIGHT):
+            return not (size < enough and 0.0 <= wrap[0] < 2.0 * math.pi), wrap, e, hung
         square = turn * turn + swivel * swivel
         if square > 0.0 and r1 != 0.0:
             g1 = (new1 - r1 - J11 * turn - J12 * swivel) / square
@@ -143,21 +155,18 @@ def _settle(i, pulley, wrap, e, span, p_WB, v_WB, length, rate, w, law, p_WA, ru
         r1, r2 = (new1, new2) if solves else (0.0, 0.0)
         det = J11 * J22 - J12 * J21
         if not abs(det) > 1e-9:
-            return True, wrap, e, nearby
+            return True, wrap, e, hung
         turn = min(max((J12 * new2 - J22 * new1) / det, -LARGEST_TURN), LARGEST_TURN)
         swivel = min(max((J21 * new1 - J11 * new2) / det, -LARGEST_SWIVEL), LARGEST_SWIVEL)
         theta = wrap[0] + turn
         if not upright:
             e = _turned_about(a, e, swivel)
-        is_there = solves and abs(new1) < enough and abs(new2 * wrap[1]) < enough
-        if theta < 0.0 and not upright and not is_there:
+        is_last = solves and size < enough
+        if theta < 0.0 and not upright and not is_last:
             theta, e, r1 = -theta, (-e[0], -e[1], -e[2]), 0.0
             J12, J21 = -J12, -J21
-        wrap = _wrap(theta)
-        if is_there:
-            return not 0.0 <= theta < 2.0 * math.pi, wrap, e, nearby
-        solves = True
-    return True, wrap, e, nearby
+        wrap, solves = _wrap(theta), True
+    return True, wrap, e, hung
 
 
 @jit
@@ -285,7 +294,10 @@ def _search(i, pulley, theta, e, hanging):
 
 
 @jit
-def _find(i, pulley, wrap, e, span, p_WB, v_WB, length, rate, w, law, p_WA, run, out):
+def _find(
+    i, pulley, wrap, e, span, p_WB, v_WB, length, rate, w, law, damping_time, differs, p_WA, run,
+    out,
+):  # fmt: skip
     """Find the contact: from the straight cable's; by a search; from others about the axis.
 
     Arguments and result as those of `_settle`.
@@ -295,23 +307,64 @@ def _find(i, pulley, wrap, e, span, p_WB, v_WB, length, rate, w, law, p_WA, run,
         if attempt == 1:
             hanging = (p_WB, v_WB, length, rate, w, law, p_WA, run, out)
             failed, theta, new_e = _search(i, pulley, wrap[0], start, hanging)
-            found, nearby = _wrap(theta), AFRESH
-        else:
-            failed, found, new_e, nearby = _settle(
-                i, pulley, wrap, e, span, p_WB, v_WB, length, rate, w, law, p_WA, run, out
+            found = _wrap(theta)
+            _place(i, pulley, found, new_e, p_WA, run)
+            hung = force(
+                i, p_WA, p_WB, v_WB, length, rate, w, law, run, damping_time, differs, AFRESH, out
             )
+            failed = failed or hung[0]
+        else:
+            failed, found, new_e, hung = _settle(
+                i, pulley, wrap, e, span, p_WB, v_WB, length, rate, w, law, damping_time, differs,
+                p_WA, run, out,
+            )  # fmt: skip
         if not failed or (upright and attempt > 0):
             break
         if attempt > 0:
             wrap, e = _wrap(0.1), _turned_about(pulley[1], start, 0.25 * math.pi * attempt)
-    return failed, found, new_e, nearby
+    return failed, found, new_e, hung
+
+
+@jit
+def _damped_parts(i, rate, v, viscosity, rho, run, out, jacobian, damped, by_turn):
+    """Write what damping adds to the first five outputs, and to their change with theta.
+
+    The gradient e of the stretch is by B and the length (kernels/catenary.py), and the run enters
+    the span as the length does, over 1 + strain: of e itself the strain changes too, which its
+    share of the length says, run / (1 + strain) = length - l0.
+    """
+    for row in range(5):
+        damped[row], by_turn[row] = 0.0, 0.0
+    pull = jacobian[i, 3, 7]  # - viscosity e_l^2
+    if pull == 0.0:
+        return
+    e_l = -math.sqrt(-pull / viscosity)
+    e_B = (
+        -jacobian[i, 0, 7] / (viscosity * e_l),
+        -jacobian[i, 1, 7] / (viscosity * e_l),
+        -jacobian[i, 2, 7] / (viscosity * e_l),
+    )
+    T_d = viscosity * (dot(e_B, v) + e_l * rate)
+    share = rho * e_l / run
+    d_B = (
+        share * jacobian[i, 13, 0], share * jacobian[i, 13, 1], share * jacobian[i, 13, 2]
+    )  # fmt: skip
+    d_l = share * (jacobian[i, 13, 6] - 1.0)
+    dT_d = viscosity * (dot(d_B, v) + d_l * rate)
+    t_B = (out[i, 8], out[i, 9], out[i, 10])
+    for a in range(3):
+        damped[a] = -e_B[a] * T_d
+        by_turn[a] = -(d_B[a] * T_d + e_B[a] * dT_d)
+    damped[3], by_turn[3] = -e_l * T_d, -(d_l * T_d + e_l * dT_d)
+    damped[4] = dot(e_B, t_B) * T_d
+    by_turn[4] = dot(d_B, t_B) * T_d + dot(e_B, t_B) * dT_d
 
 
 @jit
 def _follow(i, pulley, wrap, e, B, strain, damped, l, by_contact, jacobian):
     """Add to jacobian[i] what comes from the contact's following B and the length.
 
-    by_contact (2, 14): scratch; damped (5,): the parts of the first outputs that damping adds.
+    by_contact (2, 14): scratch, its first five `_damped_parts`' by_turn; damped (5,): from there.
     """
     F, a, rho, _run, upright = pulley
     _theta, s, c = wrap
@@ -323,7 +376,9 @@ def _follow(i, pulley, wrap, e, B, strain, damped, l, by_contact, jacobian):
     for row in range(14):
         X_B = vector(jacobian[i, row])
         own = damped[row] / l if row < 5 else 0.0
-        by_turn[row] = -rho * (dot(X_B, t) + (float(jacobian[i, row, 6]) - own) / (1.0 + strain))
+        more = by_turn[row] if row < 5 else 0.0
+        along = dot(X_B, t) + (float(jacobian[i, row, 6]) - own) / (1.0 + strain)
+        by_turn[row] = more - rho * along
         by_swivel[row] = -r * dot(X_B, f)
     # The conditions n . t_A = 0 and f . t_A = 0, by theta and sigma.
     turn_t, swivel_t = vector(by_turn[5:8]), vector(by_swivel[5:8])
@@ -378,35 +433,34 @@ def _over_pulleys(points, p_WB, v_WB, length, rate, constants, differs, out, jac
         F, a, B = vector(points[0, i]), vector(points[2, i]), vector(p_WB[i])
         rho = float(points[3, i, 0])
         pulley = (F, a, rho, float(constants[6 + i]), is_upright(a))
-        wrap, e, nearby = (0.0, 0.0, 1.0), a, AFRESH
+        wrap, e = (0.0, 0.0, 1.0), a
         if rho > 0.0:
             wrap, e, span = straight_contact(F, a, rho, B)
             if not span > 0.0:
                 return i + 1
-            failed, wrap, e, nearby = _find(
-                i, pulley, wrap, e, span, p_WB, v_WB, length, rate, w, law, p_WA, run, out
+            failed, wrap, e, hung = _find(
+                i, pulley, wrap, e, span, p_WB, v_WB, length, rate, w, law, damping_time, differs,
+                p_WA, run, out,
+            )  # fmt: skip
+        else:
+            _place(i, pulley, wrap, e, p_WA, run)
+            hung = force(
+                i, p_WA, p_WB, v_WB, length, rate, w, law, run, damping_time, differs, AFRESH, out
             )
-            if failed:
-                return i + 1
-        _place(i, pulley, wrap, e, p_WA, run)
-        failed, H, V_B, Bx, linear = force(
-            i, p_WA, p_WB, v_WB, length, rate, w, law, run, damping_time, differs, nearby, out
-        )
+            failed = hung[0]
         if not failed and differs:
             failed = differentiate(
                 i, p_WA, p_WB, v_WB, length, rate, w, law, run, damping_time,
-                H, V_B, Bx, linear, out, jacobian,
+                hung[1], hung[2], hung[3], hung[4], out, jacobian,
             )  # fmt: skip
             if rho > 0.0:
-                h, V_A = out[i, 12], V_B - w * out[i, 13]
-                T_A, T_B = math.sqrt(h * h + V_A * V_A), math.sqrt(h * h + V_B * V_B)
-                is_cut = out[i, 3] == 0.0 or out[i, 4] == 0.0
-                for row in range(3):
-                    damped[row] = 0.0 if is_cut else out[i, row] + T_B * out[i, 8 + row]
-                damped[3] = 0.0 if is_cut else out[i, 3] - T_A
-                damped[4] = 0.0 if is_cut else out[i, 4] - T_B
+                h, V_A = out[i, 12], hung[2] - w * out[i, 13]
+                T_A, l = math.sqrt(h * h + V_A * V_A), float(length[i])
                 EA, _slope = secant_stiffness(T_A, float(law[0]), float(law[1]), float(law[2]))
-                l = float(length[i])
+                _damped_parts(
+                    i, float(rate[i]), vector(v_WB[i]), EA * damping_time / l, rho, run[i],
+                    out, jacobian, damped, by_contact[0],
+                )  # fmt: skip
                 _follow(i, pulley, wrap, e, B, T_A / EA, damped, l, by_contact, jacobian)
         if failed:
             return i + 1

@@ -1,12 +1,12 @@
-"""Cables near their drawing points in the images of stereo pairs, and their tangents from them.
+"""Cables near where they leave in the images of stereo pairs, and their tangents from them.
 
-Arguments: A (3,), u (3,): drawing point and unit tangent there, from A to B, in W; T: tension there
-[N]; w: weight per unstrained metre [N/m]; EA: axial stiffness [N]; radius: of the cable [m]; s,
-stations (n,): unstrained lengths from A [m]; camera (21,): as kernels/vision.py has it; plane
-(2, n, 2): normalised image coordinates of both edges, NaN where not seen; pixels: the same in
-pixels; normal (3,): unit normal of an interpretation plane, in W. For k cables: drawing (k, 3),
-tangents (k, 3), tensions (k,), lefts, rights (k, 21), images (k, 2, 2, n, 2) by cable, camera and
-edge.
+Arguments: A (3,), u (3,): where a cable leaves, and its unit tangent there, from A to B, in W; T:
+tension there [N]; w: weight per unstrained metre [N/m]; EA: axial stiffness [N]; radius: of the
+cable [m]; s, stations (n,): unstrained lengths from A [m]; camera (21,): as kernels/vision.py has
+it; plane (2, n, 2): normalised image coordinates of both edges, NaN where not seen; pixels: the
+same in pixels; normal (3,): unit normal of an interpretation plane, in W. For k cables: points (4,
+k, 3): as in `model.arrays`, of which each A follows with the tangent; tangents (k, 3), tensions
+(k,), lefts, rights (k, 21), images (k, 2, 2, n, 2) by cable, camera and edge.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from cdpr_drake.model.kernels import jit
+from cdpr_drake.model.kernels.geometry import place_leaving
 from cdpr_drake.model.kernels.vision import distort, undistort
 
 CORRECTIONS = 3  # of the curvature; each leaves less than a hundredth of what was wrong
@@ -174,14 +175,22 @@ def direction(left, right, left_plane, right_plane, towards, u):
 
 
 @jit
-def see(drawing, tangents, tensions, w, EA, radius, stations, lefts, rights, sizes, images):
+def leave(points, tangents, p_WA):
+    """Write where k cables leave along their tangents, p_WA (k, 3)."""
+    for i in range(tangents.shape[0]):
+        place_leaving(i, points, tangents[i], p_WA[i])
+
+
+@jit
+def see(points, tangents, tensions, w, EA, radius, stations, lefts, rights, sizes, images):
     """Write the images of k cables; sizes (k, 2, 2): width and height of left and right images."""
-    plane = np.empty((2, stations.shape[0], 2))
-    for i in range(drawing.shape[0]):
+    plane, A = np.empty((2, stations.shape[0], 2)), np.empty(3)
+    for i in range(tangents.shape[0]):
+        u, T = tangents[i], tensions[i]
+        place_leaving(i, points, u, A)
         for side in range(2):
             camera = lefts[i] if side == 0 else rights[i]
-            u, T = tangents[i], tensions[i]
-            edges(camera, drawing[i], u, T, w, EA[i], radius, stations, plane)
+            edges(camera, A, u, T, w, EA[i], radius, stations, plane)
             to_pixels(camera, sizes[i, side, 0], sizes[i, side, 1], plane, images[i, side])
 
 
@@ -212,7 +221,7 @@ def shake(images, noise, sigma):
 def measure(
     images,
     towards,
-    drawing,
+    points,
     tensions,
     w,
     EA,
@@ -224,17 +233,18 @@ def measure(
     sines,
     bias,
 ):
-    """Write the tangents (k, 3) at the drawing points from images of the cables.
+    """Write the tangents (k, 3) where the cables leave from images of them.
 
     What the pairs see is the direction of a line laid through a sagging piece of cable. For a
-    tangent u and the tension, the same line is laid through the piece computed; u is moved until
-    both agree. towards (k, 3): directions from A to B; sines (k,): of the angles between planes, 0
-    where a cable is not seen; bias (k,): angle from tangent to line [rad].
+    tangent u and the tension, the same line is laid through the piece computed, from where a cable
+    leaves along u; u is moved until both agree. towards (k, 3): directions from A to B; sines (k,):
+    of the angles between planes, 0 where a cable is not seen; bias (k,): angle from tangent to line
+    [rad].
     """
     n = stations.shape[0]
     seen = np.empty((2, 2, n, 2))
     piece = np.empty((2, 2, n, 2))
-    line, computed = np.empty(3), np.empty(3)
+    line, computed, A = np.empty(3), np.empty(3), np.empty(3)
     for i in range(images.shape[0]):
         for side in range(2):
             camera = lefts[i] if side == 0 else rights[i]
@@ -253,9 +263,10 @@ def measure(
         t = tangents[i]
         t[:] = line
         for _ in range(CORRECTIONS):
+            place_leaving(i, points, t, A)
             for side in range(2):
                 camera = lefts[i] if side == 0 else rights[i]
-                edges(camera, drawing[i], t, tensions[i], w, EA[i], radius, stations, piece[side])
+                edges(camera, A, t, tensions[i], w, EA[i], radius, stations, piece[side])
                 for edge in range(2):
                     for j in range(n):
                         if not np.isfinite(seen[side, edge, j, 0]):

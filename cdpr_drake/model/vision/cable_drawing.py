@@ -35,10 +35,11 @@ class CableDrawing:
     """Draws the images of the stereo pairs: dark cables on a white panel that fills the image.
 
     A cable is the curved elastic catenary of `CableImages`, of the robot's diameter, between the
-    two edges of its silhouette. It begins at its drawing point, where it is cut off across, and
-    goes on to the image's border. A pixel is as dark as the part of it that the cable, blurred by
-    the optics, covers; the integral is exact for an edge that is straight within the pixel. Where
-    cables cross, both cover. Then come white noise and rounding to 8 bits.
+    two edges of its silhouette. It begins where it leaves the frame, at its drawing point or off
+    its pulley, is cut off across there, and goes on to the image's border. A pixel is as dark as
+    the part of it that the cable, blurred by the optics, covers; the integral is exact for an edge
+    that is straight within the pixel. Where cables cross, both cover. Then come white noise and
+    rounding to 8 bits.
 
     Args:
         robot: the true robot.
@@ -106,7 +107,7 @@ class CableDrawing:
         width, height = s.sizes[cable, side]
         edges = np.empty((2, len(self._stations), 2))
         s.kernel.edges(
-            camera, s.drawing[cable], u[cable], T[cable], s.robot.weight_per_metre,
+            camera, s.leaving(u)[cable], u[cable], T[cable], s.robot.weight_per_metre,
             s.stiffness(T)[cable], s.radius, self._stations, edges,
         )  # fmt: skip
         self._outline(camera, width, height, edges.copy(), edges)

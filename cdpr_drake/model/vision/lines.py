@@ -42,7 +42,8 @@ class CableLines:
     expected, weighted by contrast, outliers rejected by Tukey's biweight.
 
     A cable that was not seen, or is not found there, is searched in the whole images: its line
-    leads through its own drawing point, so the dark pixels are counted by their angle about it.
+    leads through the point where it leaves the frame, for a pulley as a straight cable would, so
+    the dark pixels are counted by their angle about it.
 
     Args:
         robot: the robot as the controller believes it.
@@ -74,7 +75,7 @@ class CableLines:
             tangents: (k, 3), of the last frame; all cables are searched if None.
             known: (k,), whether those were measured; if None they were.
         """
-        k = len(self._stereo.drawing)
+        k = self._stereo.robot.num_cables
         last = np.zeros((k, 3)) if tangents is None else np.array(tangents, float).reshape(-1, 3)
         if tangents is None:
             known = np.zeros(k, bool)
@@ -106,14 +107,14 @@ class CableLines:
         s = self._stereo
         edges = np.full((*s.shape, 2), np.nan)
         found = np.zeros(len(which), bool)
-        EA = s.stiffness(tension)
+        EA, p_WA = s.stiffness(tension), s.leaving(tangents)
         for i in np.flatnonzero(which):
             pair = images[s.pairs[i]]
             if pair is None:
                 continue
             both = [
                 self._kernel.track(
-                    pair[side], camera, s.drawing[i], tangents[i], tension[i],
+                    pair[side], camera, p_WA[i], tangents[i], tension[i],
                     s.robot.weight_per_metre, EA[i], s.radius, s.stations, REACH, LEAST_CONTRAST,
                     edges[i, side],
                 )
@@ -136,7 +137,8 @@ class CableLines:
             which: (k,), the cables to search.
         """
         s = self._stereo
-        chords = s.chords(X_WP)
+        ends = s.ends(X_WP)
+        p_WA, chords = ends.p_WA, ends.chord
         tangents, found = np.zeros((len(which), 3)), np.zeros(len(which), bool)
         for index, pair in enumerate(images):
             cables = np.flatnonzero(which & (s.pairs == index))
@@ -146,7 +148,7 @@ class CableLines:
             rays = [_dark_rays(*both) for both in zip(pair, cameras, strict=True)]
             for i in cables:
                 left, right = (
-                    self._plane(camera, dark, s.drawing[i], chords[i])
+                    self._plane(camera, dark, p_WA[i], chords[i])
                     for camera, dark in zip(cameras, rays, strict=True)
                 )
                 if left is None or right is None:

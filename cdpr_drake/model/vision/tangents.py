@@ -1,4 +1,4 @@
-"""Tangents to the cables at their drawing points from stereo pairs (section 4.2, eq. 17)."""
+"""Tangents to the cables where they leave the frame, from stereo pairs (section 4.2, eq. 17)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydrake.math import RigidTransform
 
-from cdpr_drake.model.kinematics import cable_ends
+from cdpr_drake.model.arrays import RobotArrays
+from cdpr_drake.model.kinematics import CableEnds, cable_ends
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import Array
 from cdpr_drake.model.vision.cameras import observers
@@ -51,9 +52,9 @@ class StereoGeometry:
         lefts: (k, 21), its left cameras, packed.
         rights: (k, 21), its right cameras, packed.
         sizes: (k, 2, 2) [px], width and height of left and right images.
-        stations: (n,) [m], where edges are looked at, from the drawing point along the cable.
+        stations: (n,) [m], where edges are looked at, from where it leaves along the cable.
         radius: of the cable [m].
-        drawing: (k, 3) [m], the drawing points.
+        points: (4, k, 3), `RobotArrays.points`.
         shape: (k, 2, 2, n), of what is seen: by cable, camera, edge and station.
 
     Args:
@@ -82,7 +83,7 @@ class StereoGeometry:
         start, end = setup.cable_segment
         self.stations = np.linspace(float(start), float(end), setup.edge_points)
         self.radius = 0.5 * robot.cable.diameter
-        self.drawing = np.array(robot.drawing_points)
+        self.points = RobotArrays(robot).points
         self.shape = (robot.num_cables, 2, 2, setup.edge_points)
 
     def stiffness(self, tension: Array) -> Array:
@@ -102,21 +103,35 @@ class StereoGeometry:
         floor = LEAST_TENSION * self.robot.cable.min_tension + 1e-3
         return np.maximum(np.asarray(tension, float), floor)
 
-    def chords(self, X_WP: RigidTransform) -> Array:
-        """Return the vectors (k, 3) [m] from drawing to attachment points, in W.
+    def leaving(self, tangents: Array) -> Array:
+        """Return where cables leave (k, 3) [m], in W: the drawing points, or off their pulleys.
+
+        A camera knows no pose; a cable's tangent says how far it wraps its pulley, and which way
+        the pulley faces, up to half a turn of wrap: attachment points must stay farther than the
+        pulley's diameter from its axis.
+
+        Args:
+            tangents: (k, 3), unit, there, from A to B, in W.
+        """
+        p_WA = np.empty((len(tangents), 3))
+        self.kernel.leave(self.points, tangents, p_WA)
+        return p_WA
+
+    def ends(self, X_WP: RigidTransform) -> CableEnds:
+        """Return the ends of all cables at a pose, as if they were straight.
 
         Args:
             X_WP: pose of the platform.
         """
-        return cable_ends(self.robot, X_WP).chord
+        return cable_ends(self.robot, X_WP)
 
 
 class CableImages:
     """The images of the cables near their drawing points: both edges of each, in both cameras.
 
     A cable is the curved elastic catenary, of the robot's diameter; its edges are seen at
-    `edge_points` stations along the robot's `cable_segment`, each disturbed across the edge. Cables
-    hide nothing of each other.
+    `edge_points` stations along the robot's `cable_segment`, from where it leaves the frame, each
+    disturbed across the edge. Cables and pulleys hide nothing of each other.
 
     Args:
         robot: the true robot.
@@ -152,7 +167,7 @@ class CableImages:
         u = np.array(tangents, float).reshape(-1, 3)
         images = np.empty((*s.shape, 2))
         s.kernel.see(
-            s.drawing, u, T, s.robot.weight_per_metre, s.stiffness(T), s.radius, s.stations,
+            s.points, u, T, s.robot.weight_per_metre, s.stiffness(T), s.radius, s.stations,
             s.lefts, s.rights, s.sizes, images,
         )  # fmt: skip
         if noise is not None:
@@ -167,7 +182,8 @@ class TangentEstimator:
     plane midway of both edges holds the cable. The planes of both cameras meet in its direction
     (eq. 17), u = n_l x n_r / |n_l x n_r|, with both normals in W and the sign that the pose gives.
     What meets there is a line laid through a sagging piece of cable; the tangent at A follows with
-    the measured tension, by comparing with the piece computed.
+    the measured tension, by comparing with the piece computed. A pulley moves A with the tangent,
+    and so it does that of the piece computed.
 
     Args:
         robot: the robot as the controller believes it.
@@ -188,12 +204,12 @@ class TangentEstimator:
             X_WP: measured pose of the platform; the sign of the tangents follows from it.
         """
         s = self._stereo
-        k = len(s.drawing)
-        chords = s.chords(X_WP)
+        k = s.robot.num_cables
+        chords = s.ends(X_WP).chord
         T = s.believable(tension)
         tangents, sines, bias = np.zeros((k, 3)), np.empty(k), np.empty(k)
         s.kernel.measure(
-            np.ascontiguousarray(images), chords, s.drawing, T, s.robot.weight_per_metre,
+            np.ascontiguousarray(images), chords, s.points, T, s.robot.weight_per_metre,
             s.stiffness(T), s.radius, s.stations, s.lefts, s.rights, tangents, sines, bias,
         )  # fmt: skip
         across = np.column_stack([-chords[:, 1], chords[:, 0]])
