@@ -20,6 +20,9 @@ PAGE, FIGURE = DOCS / "pulleys.md", DOCS / "images" / "pulleys.png"
 
 COGIRO, OTHERS, TEST = "cogiro-2015-pulleys", ("caroca", "cuhk-cablerobot"), 4
 
+LEAST = 0.001
+"""What is smaller is not told [mm, deg, %]."""
+
 
 def studies() -> Iterator[PulleyStudy]:
     """Yield the paper's Test 4 on CoGiRo as of 2015, then a short move of each of three robots."""
@@ -61,9 +64,13 @@ def _cells(jsc: BeliefCost, vbc: BeliefCost) -> list[str]:
         jsc.position_error, jsc.orientation_error, jsc.apart, jsc.tension_change,
         vbc.position_error, vbc.apart, vbc.led_aside, vbc.tension_change,
     ]  # fmt: skip
-    cells = ["–" if value is None else significant(value, 2) for value in values]
+    cells = ["–" if value is None else _figure(value) for value in values]
     rates = (vbc.slowest, vbc.fastest)
     return cells + ["–" if rate is None else f"{rate:.3f}" for rate in rates]
+
+
+def _figure(value: float) -> str:
+    return significant(value, 2) if value == 0.0 or value >= LEAST else f"< {LEAST:g}"
 
 
 def main() -> None:

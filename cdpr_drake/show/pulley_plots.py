@@ -72,7 +72,7 @@ def pulley_figure(studies: Sequence[PulleyStudy]) -> Figure:
         limits = [axes.get_xlim() for axes in column]
         low, high = min(x for x, _ in limits), max(x for _, x in limits)
         for axes in column:
-            axes.set_xlim(max(low, LEAST) / 8.0, 8.0 * high)
+            axes.set_xlim(max(low, LEAST) / 15.0, 8.0 * high)
     handles = [Line2D([], [], linestyle="", markersize=7, **style) for style in STYLES.values()]
     figure.legend(handles=handles, loc="outside upper right", ncols=2, frameon=False)
     return figure
