@@ -210,7 +210,8 @@ def led_aside(error: ArrayLike, exact: ArrayLike) -> tuple[float, float]:
     apart = []
     for s in (np.asarray(error, float), np.asarray(exact, float)):
         halves = s.reshape(-1, 2, 3)
-        home = halves[0] / np.linalg.norm(halves[0], axis=1, keepdims=True)
+        size = np.linalg.norm(halves[0], axis=1, keepdims=True)
+        home = halves[0] / np.where(size > 0.0, size, 1.0)  # all is aside of no way
         apart.append(halves - np.sum(halves * home, axis=2, keepdims=True) * home)
     rotation, position = np.linalg.norm(apart[0] - apart[1], axis=2).max(axis=0)
     return float(rotation), float(position)

@@ -26,6 +26,7 @@ BUILT_IN = (
     "calibrate",
     "sweep",
     "ablate",
+    "pulleys",
     "robots",
 )
 """Each a module here, in the order of the list of commands."""

@@ -159,8 +159,8 @@ class Winch(Record):
         integral_gain: [N m/(rad s)].
         derivative_gain: [N m s/rad].
         torque_limit: [N m].
-        encoder_zero_length: (k,) [m], unstrained length, from the drum on, at motor angle 0; a
-            number stands for all cables.
+        encoder_zero_length: (k,) [m], unstrained length, from the drum on, at motor angle 0, below
+            zero if no motor gets there; a number stands for all cables.
         coulomb_torque: [N m], dry friction at the motor; 0 is none.
         coulomb_rate: [rad/s], motor rate over which the dry friction builds up.
         capstan_exponent: [-], friction coefficient times angle of wrap at the drawing point; 0 is

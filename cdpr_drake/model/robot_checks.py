@@ -53,7 +53,6 @@ _NOT_NEGATIVE = (
     "winch.proportional_gain",
     "winch.integral_gain",
     "winch.derivative_gain",
-    "winch.encoder_zero_length",
     "winch.coulomb_torque",
     "winch.capstan_exponent",
     "cameras.position_noise",
@@ -75,6 +74,7 @@ _FINITE = (
     "payload.center_of_mass",
     "payload.inertia",
     "cable.stiffness.softening",
+    "winch.encoder_zero_length",
     "load_cells.bias",
 )
 

@@ -15,6 +15,7 @@ from cdpr_drake.show.plots import (
     save_figures,
     tension_figure,
 )
+from cdpr_drake.show.pulley_plots import pulley_figure
 from cdpr_drake.show.replay import write_replay
 from cdpr_drake.show.screenshot import BrowserError, screenshot_replay
 from cdpr_drake.show.sensor_plots import ablation_figure, calibration_study_figure
@@ -38,6 +39,7 @@ __all__ = [
     "number_cables",
     "pole_figure",
     "pose_error_figure",
+    "pulley_figure",
     "rates_and_responses_figure",
     "sag_figure",
     "save_figures",
