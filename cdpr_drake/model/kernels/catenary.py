@@ -485,9 +485,9 @@ def _leaning_chord(i, p_WA, p_WB):
 
 
 @jit
-def guess_tangent(i, p_WA, p_WB, length, drum_run, w, stiffness):
+def sketch(i, p_WA, p_WB, length, drum_run, w, stiffness, start):
     """Return (t_A, kappa, start): nearly the unit tangent [-] and the curvature [1/m] of cable i
-    at A, and (H, V_B, l0), after one step of Newton's; for numbers that are no cable's, zeros.
+    at A, and (H, V_B, l0), a step of Newton's from `start`; zeros for what is no cable.
     """
     dx, dy, Bz, Bx, L = _leaning_chord(i, p_WA, p_WB)
     l, run = float(length[i]), float(drum_run[i])
@@ -495,7 +495,9 @@ def guess_tangent(i, p_WA, p_WB, length, drum_run, w, stiffness):
     if not _admissible(Bx, L, l, run, w, asymptote, softening, offset):
         return (0.0, 0.0, 0.0), 0.0, AFRESH
     w, level = max(w, MIN_WEIGHT), max(Bx, MIN_SLOPE * L)
-    H, V_B, l0 = _guess(level, Bz, L, l, run, w, asymptote, softening, offset)
+    H, V_B, l0 = start
+    if H == 0.0:
+        H, V_B, l0 = _guess(level, Bz, L, l, run, w, asymptote, softening, offset)
     x, z, r, Kxx, Kxz, Kzx, Kzz, mx, mz, mu, k, _T_A, _T_B, _EA, _dEA = _linearise(
         H, V_B, l0, l, run, w, asymptote, softening, offset
     )

@@ -29,8 +29,8 @@ from cdpr_drake.model.kernels.catenary import (
     cable_forces_jacobian,
     differentiate,
     force,
-    guess_tangent,
     secant_stiffness,
+    sketch,
 )
 from cdpr_drake.model.kernels.geometry import (
     away_from_entry,
@@ -52,7 +52,7 @@ TIGHT = 1e-9
 FOUND = 1e-12
 """Angles [rad] at which a search ends."""
 
-ROUNDS = 30
+ROUNDS, SKETCHES = 30, 2
 
 LARGEST_TURN, LARGEST_SWIVEL = 0.7, 1.0  # rad a step
 
@@ -114,21 +114,22 @@ def _settle(
     """Find the contact from a straight cable's, `span` long, by quasi-Newton steps.
 
     Return (failed, wrap, e, hung), and row i of `out` written there; hung: what `catenary.force`
-    has returned. The matrix of the first steps is that of a straight cable with the curvature of
-    this one; Broyden's rule improves it.
+    has returned. The first steps are for cables as sketched; their matrix is that of a straight
+    cable with the curvature of this one, and Broyden's rule improves it.
     """
     _F, a, rho, _run, upright = pulley
-    _place(i, pulley, wrap, e, p_WA, run)
-    t_A, kappa, nearby = guess_tangent(i, p_WA, p_WB, length, run, w, law)
-    _theta, s, c = wrap
-    J11, J12, J21 = -1.0 - a[2] * rho * kappa, 0.0, 0.0
-    J22 = -1.0 - rho * (1.0 - c) / max(span * abs(s), 1e-9)
-    enough = min(max(SETTLED, 5e-10 / max(rho * kappa, 1e-9)), ROUGHLY)
-    r1, r2, turn, swivel = 0.0, 0.0, 0.0, 0.0
-    solves, is_last, hung = False, False, NOT_HUNG
-    for _round in range(ROUNDS):
-        if solves:
-            _place(i, pulley, wrap, e, p_WA, run)
+    J11, J12, J21 = -1.0, 0.0, 0.0
+    J22 = -1.0 - rho * (1.0 - wrap[2]) / max(span * abs(wrap[1]), 1e-9)
+    enough, r1, r2, turn, swivel = SETTLED, 0.0, 0.0, 0.0, 0.0
+    is_last, hung, nearby = False, NOT_HUNG, AFRESH
+    for count in range(ROUNDS):
+        solves = count >= SKETCHES
+        _place(i, pulley, wrap, e, p_WA, run)
+        if not solves:
+            t_A, kappa, nearby = sketch(i, p_WA, p_WB, length, run, w, law, nearby)
+            J11 = -1.0 - a[2] * rho * kappa
+            enough = min(max(SETTLED, 5e-10 / max(rho * kappa, 1e-9)), ROUGHLY)
+        else:
             hung = force(
                 i, p_WA, p_WB, v_WB, length, rate, w, law, run, damping_time, differs, nearby, out
             )
@@ -165,7 +166,7 @@ def _settle(
         if theta < 0.0 and not upright and not is_last:
             theta, e, r1 = -theta, (-e[0], -e[1], -e[2]), 0.0
             J12, J21 = -J12, -J21
-        wrap, solves = _wrap(theta), True
+        wrap = _wrap(theta)
     return True, wrap, e, hung
 
 
