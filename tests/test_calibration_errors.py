@@ -53,7 +53,7 @@ def test_a_seed_gives_one_calibration_in_any_size() -> None:
 
 def test_pulleys_are_misjudged_alike_and_eyelets_are_not() -> None:
     robot = load_robot("cogiro-2015-pulleys")
-    mixed = robot.replace(pulleys=Pulleys(radius=0.05 * (np.arange(8) % 2)))
+    mixed = robot.replace(pulleys=Pulleys(radius=0.05 * (np.arange(8) % 2), axis=[0, 0, 1]))
     believed = misjudged(mixed, ERRORS, 3)
     error = believed.pulley_radii - mixed.pulley_radii
     assert error[1] != 0.0 and not error[::2].any()

@@ -70,7 +70,7 @@ def test_without_a_pulley_it_leaves_at_the_drawing_point() -> None:
     _, u, _ = cables("upright")
     robot = eyelets()
     np.testing.assert_array_equal(StereoGeometry(robot).leaving(u), robot.drawing_points)
-    some = robot.replace(pulleys=Pulleys(radius=0.05 * (np.arange(8) % 2)))
+    some = robot.replace(pulleys=Pulleys(radius=0.05 * (np.arange(8) % 2), axis=[0, 0, 1]))
     shift = np.linalg.norm(StereoGeometry(some).leaving(u) - robot.drawing_points, axis=1)
     assert not shift[::2].any() and shift[1::2].min() > 0.05
 

@@ -62,6 +62,18 @@ def _add_arguments(parser: ArgumentParser) -> None:
     common.add_output(parser)
 
 
+LEGEND = {
+    "error": "Error: at the end, to the goal.",
+    "apart": "Apart: the largest distance from where the platform is at the same time with the "
+    "true belief.",
+    "tension": "Tension: the largest difference from it then.",
+    "aside": "Aside: farthest from the way with the true belief, across the straight way.",
+    "Gamma": "Gamma: the slowest and fastest eigenvalue of the gain matrix at the goal, 1 for an "
+    "exact law.",
+}
+"""What columns mean; of those that a narrow terminal leaves out nothing is said."""
+
+
 def _study(options: Namespace) -> int:
     from cdpr_drake.runs.pulley_study import pulley_study, require_pulleys
 
@@ -129,9 +141,10 @@ def to_csv(study: PulleyStudy) -> str:
 def _lines(study: PulleyStudy) -> Iterator[str]:
     """Yield the lines of the answer."""
     yield from wrapped(
-        f"{study.robot}, {study.move}: {study.distance:.2f} m, pulleys of up to "
+        f"{study.robot}, {study.move}: {study.distance:.2f} m, largest pulley "
         f"{1e3 * study.radius:g} mm, lambda = {study.gain:g} 1/s, {study.until:g} s"
     )
+    tables = ""
     for controller, how in (
         ("JSC", "ECM, encoders zeroed at the start"),
         ("VBC", study.cable_model),
@@ -139,17 +152,13 @@ def _lines(study: PulleyStudy) -> Iterator[str]:
         rows = list(study.of(controller).values())
         yield ""
         yield f"{controller} ({how})"
-        yield fitted_table(_columns(rows, controller))
+        tables += (table := fitted_table(_columns(rows, controller)))
+        yield table
         for row in rows:
             if row.failure:
                 yield from wrapped(f"{row.belief}: {row.failure}")
     yield ""
-    yield from wrapped(
-        "Error: at the end, to the goal. Apart: the largest distance from where the platform is at "
-        "the same time with the true belief. Tension: the largest difference from it then. Aside: "
-        "farthest from the way with the true belief, across the straight way. Gamma: the slowest "
-        "and fastest eigenvalue of the gain matrix at the goal, 1 for an exact law."
-    )
+    yield from wrapped(" ".join(text for name, text in LEGEND.items() if name in tables))
 
 
 def _columns(rows: list[BeliefCost], controller: str) -> list[Column]:

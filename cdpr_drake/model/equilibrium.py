@@ -104,7 +104,7 @@ def rest_state(
             )
             if status:
                 raise EquilibriumError(f"cable {i + 1} has no catenary at H = {H[i]:.3g} N")
-        sag = V_B - T * geometry.Bz / geometry.L
+        sag = V_B - T * (geometry.Bz / geometry.L)
         if np.max(np.abs(T - previous)) <= 1e-14 * np.max(np.abs(T)):
             break
         if has_pulleys(robot):  # the cables leave along their tangents

@@ -140,11 +140,11 @@ class Pulleys(Record):
         radius: (k,) [m], to the cable's centre line; a number stands for all cables.
         axis: (k, 3), in W, the swivel axis as the direction in which the cable moves as it enters,
             away from the drum: up for a pulley fed from below, down for one fed from above; of any
-            length. (3,) stands for all cables.
+            length. (3,) stands for all cables. Eyelets need none.
     """
 
     radius: np.ndarray = field(default_factory=lambda: np.array(0.0))
-    axis: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    axis: np.ndarray | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -166,8 +166,8 @@ class Winch(Record):
         capstan_exponent: [-], friction coefficient times angle of wrap at the drawing point; 0 is
             none.
         capstan_speed: [m/s], cable speed over which the capstan friction builds up.
-        on: what they stand on, "frame"; those that ride on the platform, with drums and pulleys,
-            are not modelled.
+        mounted_on: "frame"; winches that ride on the platform, with drums and pulleys, are not
+            modelled.
     """
 
     transmission: float
@@ -182,7 +182,7 @@ class Winch(Record):
     coulomb_rate: float = 0.1
     capstan_exponent: float = 0.0
     capstan_speed: float = 0.002
-    on: str = "frame"
+    mounted_on: str = "frame"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -340,7 +340,7 @@ class CableRobot(Record):
     @property
     def pulley_axes(self) -> np.ndarray:
         """Unit vectors (k, 3) along the pulleys' axes, in W, the way the cables enter."""
-        axis = self.pulleys.axis
+        axis = np.array([0.0, 0.0, 1.0]) if self.pulleys.axis is None else self.pulleys.axis
         unit: np.ndarray = axis / np.linalg.norm(axis, axis=-1, keepdims=True)
         return np.broadcast_to(unit, (self.num_cables, 3))
 

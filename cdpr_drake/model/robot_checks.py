@@ -68,7 +68,6 @@ _NOT_NEGATIVE = (
 _FINITE = (
     "drawing_points",
     "attachment_points",
-    "pulleys.axis",
     "platform.center_of_mass",
     "platform.inertia",
     "payload.center_of_mass",
@@ -109,9 +108,9 @@ def value_problems(robot: CableRobot) -> Problems:
         yield from _require(robot, path, lambda v: np.isfinite(v) & (v >= 0), ">= 0 and finite")
     if robot.gain is not None:
         yield from _positive(robot, "gain")
-    if robot.winch.on != "frame":
+    if robot.winch.mounted_on != "frame":
         text = "must be frame: winches that ride on the platform are not modelled"
-        yield "winch.on", f"{text}, got {robot.winch.on!r}"
+        yield "winch.mounted_on", f"{text}, got {robot.winch.mounted_on!r}"
     if robot.floor is not None:
         yield from _require(robot, "floor", np.isfinite, "finite")
     for name in ("X_WF", "X_PM"):
@@ -181,13 +180,22 @@ def _twins(robot: CableRobot) -> Problems:
 
 def _pulleys(robot: CableRobot) -> Problems:
     k, pulleys = robot.num_cables, robot.pulleys
-    for name, one in (("radius", ()), ("axis", (3,))):
-        got = getattr(pulleys, name).shape
-        if got not in (one, (k, *one)):
-            yield f"pulleys.{name}", f"must have shape {one} or {(k, *one)}, got {got}"
-    for axis in pulleys.axis.reshape(-1, 3):
-        if not np.linalg.norm(axis) > 0.0:
-            yield "pulleys.axis", f"must be a direction, got {axis.tolist()}"
+    radius, axis = pulleys.radius, pulleys.axis
+    if radius.shape not in ((), (k,)):
+        got = f"got {len(radius)}" if radius.ndim == 1 else f"got shape {radius.shape}"
+        yield "pulleys.radius", f"must be one number, or one for each of the {k} cables, {got}"
+    if axis is None:
+        if np.any(radius):
+            text = "is missing: [0, 0, 1] for pulleys fed from below, [0, 0, -1] from above"
+            yield "pulleys.axis", f"{text}, or one such axis for each of the {k} cables"
+        return
+    if axis.shape not in ((3,), (k, 3)):
+        got = f"got {len(axis)}" if axis.ndim == 2 else f"got shape {axis.shape}"
+        yield "pulleys.axis", f"must be one direction, or one for each of the {k} cables, {got}"
+    for i, one in enumerate(axis.reshape(-1, 3)):
+        if not 0.0 < np.linalg.norm(one) < np.inf:
+            which = f" for cable {i + 1}" if axis.ndim == 2 else ""
+            yield "pulleys.axis", f"must be a direction, got {one.tolist()}{which}"
 
 
 def _inertias(robot: CableRobot) -> Problems:

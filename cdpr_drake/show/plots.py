@@ -371,18 +371,20 @@ def _write_final_values(axes: Axes, values: Mapping[str, float], unit: str, digi
 
 
 def _limit(axes: Axes, value: float, text: str) -> None:
-    """Draw a limit and write what it is below it."""
+    """Draw a limit and write what it is below it, or above it where it is near the lower edge."""
     axes.axhline(value, color="black", linewidth=0.9, linestyle=(0, (6, 3)))
     place = axes.get_yaxis_transform()
+    bottom, top = axes.get_ylim()
+    is_low = value - bottom < 0.15 * (top - bottom)
     axes.annotate(
         text,
         (0.98, value),
         xycoords=place,
-        xytext=(0.0, -3.0),
+        xytext=(0.0, 3.0 if is_low else -3.0),
         textcoords="offset points",
         fontsize=8,
         ha="right",
-        va="top",
+        va="bottom" if is_low else "top",
     )
 
 

@@ -161,13 +161,17 @@ def _chord_and_arc(F, a, rho, wrap, e, b):
 
 @jit
 def straight_chord(i, points, b):
-    """Return the chord of cable i, were it straight, and the length of the arc round its pulley."""
+    """Return the chord of cable i, were it straight, and the length of the arc round its pulley.
+
+    The arc is below -0.5 m where b is inside of the pulley.
+    """
     rho = float(points[3, i, 0])
     if rho == 0.0:
         return chord(i, points[0], b), 0.0 * b[0]
     F, a = vector(points[0, i]), vector(points[2, i])
-    wrap, e, _l = straight_contact(F, a, rho, b)
-    return _chord_and_arc(F, a, rho, wrap, e, b)
+    wrap, e, l = straight_contact(F, a, rho, b)
+    AB, arc = _chord_and_arc(F, a, rho, wrap, e, b)
+    return AB, arc if l.real > 0.0 else arc - 1.0
 
 
 @jit

@@ -7,7 +7,8 @@ balance; out (k,) [m] and T (k,) [N]: results; jacobian (k, 6): of out; chords (
 from where the cables leave to where they attach, and round the pulleys [m]; w [N/m].
 
 Statuses: 0, the number of a cable that would push, RANK_DEFICIENT, INFEASIBLE where no tensions
-within the limits hold the weight, or CORNER where tensions within them have no derivative.
+within the limits hold the weight, CORNER where tensions within them have no derivative, or INSIDE
+where an attachment point is inside of a pulley.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ LEAST, LEAST_WITHIN, CLOSEST = range(3)
 """Rules: horizontal tensions of least norm; of least norm within the limits of the chord tensions;
 chord tensions closest to the preferred one within the limits."""
 
-INFEASIBLE, CORNER = -2, -3
+INFEASIBLE, CORNER, INSIDE = -2, -3, -4
 
 
 @jit
@@ -125,7 +126,8 @@ def _balance(R, pose, points, body, chords, D, load, weight):
     for i in range(points.shape[1]):
         ax, ay, az = chords[i, 0], chords[i, 1], chords[i, 2]
         arm = turned(R, points[1, i])
-        L = np.sqrt(ax * ax + ay * ay + az * az)
+        Bx = np.sqrt(ax * ax + ay * ay)
+        L = np.sqrt(Bx * Bx + az * az)
         ux, uy = ax / L, ay / L
         weight[i] = norm_weight(ux * ux + uy * uy)
         set_column(i, arm, (ux, uy, az / L), D)
@@ -172,6 +174,8 @@ def unstrained_lengths(model, order, rule, pose, points, body, stiffness, limits
         _arm, _b, (chords[i, 0], chords[i, 1], chords[i, 2]), arcs[i] = arm_and_chord(
             i, R, pose[3:6], points
         )
+        if arcs[i].real < -0.5:
+            return INSIDE
         if points[3, i, 0] != 0.0 and model != SLSM:
             rounds = 1 + CONTACT_ROUNDS
     status = 0
