@@ -11,7 +11,7 @@ from pydrake.autodiffutils import ExtractGradient, ExtractValue, InitializeAutoD
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cdpr_drake.analysis import gain_matrix
-from cdpr_drake.diagrams import make_cable_robot, make_vision_based_control, rest_context
+from cdpr_drake.diagrams import make_vision_based_control, rest_context
 from cdpr_drake.errors import EquilibriumError, GeometryError, RobotFileError
 from cdpr_drake.model import kinematics
 from cdpr_drake.model.equilibrium import forward_kinematics, rest_state
@@ -405,22 +405,23 @@ def test_the_whole_loop_linearises(name: str) -> None:
 
 @pytest.mark.parametrize("name", WITH_PULLEYS)
 def test_autodiff_is_that_of_differences(name: str) -> None:
+    """Of the whole loop, off its rest and on the move."""
     for robot in (load_robot(name), tilted(load_robot(name))):
         _, goal = move_near_the_middle(robot)
-        plant = make_cable_robot(robot)
-        context = rest_context(plant, goal)
-        plant.GetInputPort("external_wrench").FixValue(context, np.zeros(6))
+        loop = make_vision_based_control(robot, cable_model="ECM", sample_time=None, latency=0.0)
+        context = rest_context(loop, goal)
+        context.SetTime(2.0)  # the gain is no longer on its way
         x = context.get_continuous_state_vector().CopyToVector()
         x = x + 1e-3 * np.random.default_rng(3).normal(size=x.size)
 
-        def rates(x, plant=plant, context=context):
+        def rates(x, loop=loop, context=context):
             context.SetContinuousState(x)
-            return plant.EvalTimeDerivatives(context).CopyToVector()
+            return loop.EvalTimeDerivatives(context).CopyToVector()
 
-        other = plant.ToAutoDiffXd()
+        other = loop.ToAutoDiffXd()
         autodiff = other.CreateDefaultContext()
         autodiff.SetTimeStateAndParametersFrom(context)
-        other.FixInputPortsFrom(plant, context, autodiff)
+        other.FixInputPortsFrom(loop, context, autodiff)
         autodiff.SetContinuousState(InitializeAutoDiff(x).ravel())
         found = other.EvalTimeDerivatives(autodiff).CopyToVector()
         np.testing.assert_allclose(ExtractValue(found).ravel(), rates(x), rtol=1e-9, atol=1e-9)
