@@ -10,9 +10,9 @@ import pytest
 from pydrake.autodiffutils import ExtractGradient, ExtractValue, InitializeAutoDiff
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cdpr_drake.analysis import gain_matrix
-from cdpr_drake.diagrams import make_vision_based_control, rest_context
-from cdpr_drake.errors import EquilibriumError, GeometryError, RobotFileError
+from cdpr_drake.analysis import gain_matrix, level_workspace
+from cdpr_drake.diagrams import make_plant, make_vision_based_control, rest_context
+from cdpr_drake.errors import CableError, EquilibriumError, GeometryError, RobotFileError
 from cdpr_drake.model import kinematics
 from cdpr_drake.model.equilibrium import forward_kinematics, rest_state
 from cdpr_drake.model.inverse_kinematics import InverseKinematics
@@ -491,6 +491,8 @@ def test_cables_without_a_place_are_refused_by_name() -> None:
     ):
         with pytest.raises(GeometryError, match="cable 8 is inside of its pulley, of radius 30000"):
             ask(inside, goal)
+    large = robot.replace(pulleys=robot.pulleys.replace(radius=0.8))
+    assert 0 < len(level_workspace(large)) < len(level_workspace(robot))  # some cells are inside
     above = robot.attachment_points.copy()
     above[2] = robot.drawing_points[2] - goal.translation() + [0.02, 0.0, 2.0]
     odd = robot.replace(attachment_points=above)
@@ -498,3 +500,19 @@ def test_cables_without_a_place_are_refused_by_name() -> None:
     length[2] = 2.02
     with pytest.raises(EquilibriumError, match="cable 3: nowhere to leave its pulley"):
         forward_kinematics(odd, length, goal)
+
+
+@pytest.mark.parametrize("fast", [False, True])
+def test_a_cable_without_a_place_is_named_with_its_time(fast: bool) -> None:
+    robot = load_robot("caroca")
+    rest = rest_state(robot, move_near_the_middle(robot)[1])
+    plant = make_plant(robot, command="desired_motor_angles", load_cells=False, fast=fast)
+    context = plant.CreateDefaultContext()
+    plant.GetInputPort("desired_motor_angles").FixValue(context, rest.desired_motor_angles)
+    context.SetTime(2.5)
+    x = np.zeros(36)
+    x[3:6] = robot.drawing_points[0] - robot.attachment_points[0] + [0.07, 0.0, 0.0]
+    x[12:20] = rest.motor_angles
+    context.SetContinuousState(x)
+    with pytest.raises(CableError, match=r"cable 1 at t = 2\.5 s: the attachment point of cable 1"):
+        plant.GetOutputPort("tension_at_drawing_point").Eval(context)

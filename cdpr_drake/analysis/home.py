@@ -39,14 +39,16 @@ def room(robot: CableRobot) -> tuple[Array, Array]:
 def is_wrench_feasible(robot: CableRobot, X_WP: RigidTransform) -> bool:
     """Return whether tensions within the robot's limits hold its weight, in the statics of A.2.
 
+    None do where an attachment point is inside of a pulley.
+
     Args:
         robot: the robot, with its payload.
         X_WP: the pose.
     """
-    geometry = cable_geometry(robot, X_WP)
-    matrix, wrench = wrench_matrix(geometry), weight_wrench(robot, geometry)
     low, high = robot.cable.limits
     try:
+        geometry = cable_geometry(robot, X_WP)
+        matrix, wrench = wrench_matrix(geometry), weight_wrench(robot, geometry)
         check_rank(matrix)
         least = np.linalg.lstsq(matrix, wrench, rcond=None)[0]  # does at most poses
         if least.min() < low or least.max() > high:

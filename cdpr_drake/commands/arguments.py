@@ -190,6 +190,19 @@ def add_place(
     return group
 
 
+def add_ends(group: Any) -> None:
+    """Add --from and --to, the ends of a move that --test or the robot has otherwise.
+
+    Args:
+        group: of arguments.
+    """
+    for name, text in (("from", "start"), ("to", "goal")):
+        group.add_argument(f"--{name}", dest=text, **POSE,
+                           help=f"the platform's {text}: position [m]; roll, pitch, yaw [deg], "
+                           "level if left out (default: the test's, or of the short "
+                           "move)")  # fmt: skip
+
+
 def add_output(parser: argparse.ArgumentParser) -> Any:
     """Add what `write_answer` heeds, --output, --json, --no-figures, and return its group.
 

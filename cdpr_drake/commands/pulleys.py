@@ -44,11 +44,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
     what.add_argument("--test", type=int, metavar="N",
                       help="one of the paper's Tests 1 to 5: poses, payload, gain (default: a "
                       "short move near the middle)")  # fmt: skip
-    for name, text in (("from", "start"), ("to", "goal")):
-        what.add_argument(f"--{name}", dest=text, **common.POSE,
-                          help=f"the platform's {text}: position [m]; roll, pitch, yaw [deg], "
-                          "level if left out (default: the test's, or of the short "
-                          "move)")  # fmt: skip
+    common.add_ends(what)
     what.add_argument("--tensions", **common.TENSIONS)
     how = parser.add_argument_group("how it is controlled")
     how.add_argument("--cable-model", **common.CABLE_MODEL)

@@ -50,11 +50,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
                       "4 for CoGiRo, a short move near its middle for another robot)")  # fmt: skip
     what.add_argument("--robot", **common.ROBOT)
     what.add_argument("--payload", **common.PAYLOAD)
-    for name, text in (("from", "start"), ("to", "goal")):
-        what.add_argument(f"--{name}", dest=text, **common.POSE,
-                          help=f"the platform's {text}: position [m]; roll, pitch, yaw [deg], "
-                          "level if left out (default: the test's, or of the short "
-                          "move)")  # fmt: skip
+    common.add_ends(what)
     what.add_argument("--tensions", **common.TENSIONS)
     what.add_argument("--until", type=float, metavar="S",
                       help="time to run (default: the test's, or 80; eight time constants of a "

@@ -7,8 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cdpr_drake.model.cables import CableSet
 from cdpr_drake.model.catenary import CableState, cable_shape, elastic_catenary
 from cdpr_drake.model.kinematics import CableEnds, cable_ends
+from cdpr_drake.model.pulleys import has_pulleys
 from cdpr_drake.model.robot import CableRobot
 from cdpr_drake.model.rotations import vector_to_pose
 
@@ -17,11 +19,6 @@ SEGMENTS = 8
 
 CABLE_RADIUS = 0.025
 """Of a robot of CoGiRo's size [m]; a cable's own 2 mm could not be seen."""
-
-ROUNDS, CLOSE = 10, 1e-11
-"""At most, in which is found where a hanging cable leaves its pulley, and when it is: its tangent
-does not change any more. Each round leaves a thousandth, or a thirtieth where the axis is tilted.
-"""
 
 
 def hanging_ends(
@@ -39,22 +36,15 @@ def hanging_ends(
         tangents: (n, 3 k) unit vectors along which the cables leave, where they are known.
 
     Raises:
-        CableError: a length does not exceed the run from the drum.
-        GeometryError: an attachment point is inside of a pulley; names the cable.
+        EquilibriumError: a cable over a pulley has no catenary; names it.
     """
     known = [None] * len(poses) if tangents is None else tangents.reshape(len(poses), -1, 3)
-    found = []
+    cables, found = CableSet(robot), []
     for pose, length, tangent in zip(poses, lengths, known, strict=True):
         X_WP = vector_to_pose(pose)
-        ends = cable_ends(robot, X_WP, tangent)
-        change = np.inf if ends.contact is not None and tangent is None else 0.0
-        for _ in range(ROUNDS):
-            if ends.contact is None or change < CLOSE:
-                break
-            tangent = _hanging(robot, ends, length).tangent_at_drawing_point
-            change = np.abs(tangent - ends.contact.tangent).max()
-            ends = cable_ends(robot, X_WP, tangent)
-        found.append(ends)
+        if tangent is None and has_pulleys(robot):
+            tangent = cables.balance(X_WP, length)[2][:, 5:8]
+        found.append(cable_ends(robot, X_WP, tangent))
     return found
 
 
@@ -78,7 +68,7 @@ def cable_shapes(
 
     Raises:
         CableError: a length does not exceed the run from the drum.
-        GeometryError: an attachment point is inside of a pulley; names the cable.
+        EquilibriumError: a cable over a pulley has no catenary; names it.
     """
     ends = hanging_ends(robot, poses, lengths) if ends is None else ends
     w, cable = robot.weight_per_metre, robot.cable
